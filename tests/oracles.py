@@ -2,20 +2,8 @@
 
 Meshes are (points, triangles): (N, 2) um and (T, 3) nodes. Nothing is vectorised or cached.
 """
-import math
 
 import numpy as np
-
-
-def area(corners):
-    """Area of a triangle by the shoelace formula, positive if counterclockwise."""
-    (ax, ay), (bx, by), (cx, cy) = corners
-    return 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
-
-
-def mass(points, triangles, field):
-    """Integral of a linear field: the area of each triangle times the mean of its three values."""
-    return math.fsum(area(points[t]) * math.fsum(field[t]) / 3 for t in triangles)
 
 
 def derivative(function, place, step):

@@ -49,7 +49,7 @@ AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm
          "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)",
          "Concentrations above the supply": "(mg/L)", "Area of the aggregate": "(um²)",
          "Extent of the aggregate": "(um)", "Stress that could detach the aggregate": "(MPa)",
-         "Force of the fluid on the aggregate": "(uN/m)"}
+         "Force of the fluid on the aggregate": "(uN/m)", "Defects of the balances": "relative defect"}
 LEDGERS = {f"Ledger: {name}": {"supplied": f"{name}_supplied_pg_per_m", "leaving": f"{name}_out_pg_per_m",
                                "taken up": f"{name}_consumed_pg_per_m", "stored": f"{name}_stored_pg_per_m",
                                "unmet": f"{name}_unmet_pg_per_m"}

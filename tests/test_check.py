@@ -247,8 +247,9 @@ def test_the_drag_in_the_warning_is_that_on_a_small_half_cylinder():
     assert simplifications.DRAG == pytest.approx(drag, rel=2e-3)  # the rest is of the order of R / W
 
 
-def test_an_offset_of_the_seed_adds_to_its_reach():
-    middle, aside = (load_scene("base", [f"aggregate.position={x} um"]) for x in (0.0, -90.0))
+@pytest.mark.parametrize("position", [-90.0, 90.0])
+def test_an_offset_of_the_seed_adds_to_its_reach(position):
+    middle, aside = (load_scene("base", [f"aggregate.position={x} um"]) for x in (0.0, position))
     assert numbers.at_start(aside).reach == pytest.approx(numbers.at_start(middle).reach + 90.0, rel=1e-12)
     assert numbers.at_start(aside).area == pytest.approx(numbers.at_start(middle).area, rel=1e-12)
     assert numbers.half_length(middle) == pytest.approx(5 + 10 * 5)

@@ -59,10 +59,6 @@ def test_unset_and_set_combine(tmp_path, capsys):
     assert message == 'repro: initial_mesh: --unset "flow": the scene does not set it\n'
 
 
-#: Commands that write to standard output: a long text, lines, JSON.
-WRITERS = [["scene", "base"], ["scene"], ["check", "base", "--no-run"], ["check", "base", "--no-run", "--json"]]
-
-
 def write_to(out, *arguments):
     """Return exit status and stderr of `repro ARGUMENTS`, whose standard output is a file."""
     with start(*arguments, stdout=out) as process:
@@ -70,31 +66,29 @@ def write_to(out, *arguments):
     return process.returncode, stderr
 
 
+# All commands print with one function.
 @pytest.mark.parametrize("arguments", [
-    *WRITERS, pytest.param(["sweep", "initial_mesh", "--vary", "pore.width=40 um, 50 um"], marks=pytest.mark.thorough)])
+    ["scene", "base"],
+    pytest.param(["sweep", "initial_mesh", "--vary", "pore.width=40 um, 50 um"], marks=pytest.mark.thorough)])
 def test_a_closed_output_is_no_failure(tmp_path, arguments):
     """The output is closed as by `| head -0`. A sweep continues to its end."""
     end, pipe = os.pipe()
     os.close(end)
     status, stderr = write_to(pipe, *arguments, *(["--out", tmp_path] if "sweep" in arguments else []))
     os.close(pipe)
-    assert status == 0 and re.sub(".*(completed|computed, |looked to ).*\n", "", stderr) == ""
+    assert status == 0 and re.sub(".*completed.*\n", "", stderr) == ""
     assert "sweep" not in arguments or (tmp_path / "summary.html").exists()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that takes nothing is needed")
 @pytest.mark.parametrize("arguments, message", [
-    *((arguments, "standard output: No space left on device") for arguments in WRITERS[:3]),
-    *(pytest.param(arguments, "standard output: No space left on device", marks=pytest.mark.thorough)
-      for arguments in WRITERS[3:]),
-    (["run", "nowhere", "--out", "x", "--json"], "nowhere: neither a file nor a packaged scene"),
-])
+    (["scene", "base"], "standard output: No space left on device"),
+    (["run", "nowhere", "--out", "x", "--json"], "nowhere: neither a file nor a packaged scene")])
 def test_a_failed_write_is_reported_in_one_line(arguments, message):
     """A full disk is a failure."""
     with open("/dev/full", "w") as full:
         status, stderr = write_to(full, *arguments)
-    lines = [line for line in stderr.splitlines() if not re.search("computed, |looked to ", line)]
-    assert status == 2 and len(lines) == 1 and lines[0].startswith(f"repro: {message}")
+    assert status == 2 and stderr.count("\n") == 1 and stderr.startswith(f"repro: {message}")
 
 
 def test_a_table_has_plain_numbers(tmp_path):

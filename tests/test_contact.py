@@ -497,27 +497,3 @@ def test_contact_lines_do_not_depend_on_the_first_node():
         parts = {name: np.roll(getattr(outline, name), shift, axis=0) for name in ("points", "wall", "fixed")}
         moved = surface_ends(dataclasses.replace(outline, **parts), BOTTOM)
         assert {((node - shift) % len(outline.wall), step) for node, step in moved} == expected
-
-
-TOWER = 'aggregate.outline=[["-25 um","0 um"],["-15 um","50 um"],["15 um","50 um"],["25 um","0 um"]]'
-
-
-@pytest.mark.parametrize("preset", ["paper", "fast"])
-@pytest.mark.parametrize("bonded", [True, False])
-def test_a_bonded_lower_wall_leaves_the_upper_wall_sliding(bonded, preset):
-    """A tower from wall to wall swells by 5 %. The ends of each contact surface move apart by more than 0.5 um, and its
-    fixed point stays. No point of the lower wall moves if that wall is bonded."""
-    scene = load_scene("base", [TOWER, f"growth.wall={'bonded' if bonded else 'sliding'}", f"numerics.preset={preset}",
-                                "numerics.refinement=0.3"], unset=["aggregate.radius"])
-    start = seeded(scene)
-    expansion = contact.expand(Mechanics.of(scene), start, [1.05 * start.body.theta])
-    outline = start.boundary
-    moves = (expansion.position[start.mesh.loop] - outline.points)[:, 0]
-    for wall in (BOTTOM, TOP):
-        on = np.flatnonzero(outline.wall == wall)
-        first, last = on[np.argsort(outline.points[on, 0])[[0, -1]]]
-        assert outline.fixed[on].sum() == 1 and np.abs(moves[on[outline.fixed[on]]]).max() < 1e-9
-        if bonded and wall == BOTTOM:
-            assert np.abs(moves[on]).max() < 1e-9
-        else:
-            assert moves[first] < -0.5 and moves[last] > 0.5

@@ -16,7 +16,6 @@ from repro.model.adhesion import Peak
 from repro.model.energies.neo_hookean import BIOT
 from repro.runs.status import is_over
 from tests.test_fold import SETS as PLUG
-from tests.test_resume import check_parts
 from verification.problems.schemes import exchange, load_scene
 
 SCHEMES = pytest.mark.parametrize("scheme", ["updates", "midpoint"])
@@ -109,13 +108,6 @@ def test_rows_before_an_end_are_those_of_the_full_step():
     without, _, status = rows_of(load_scene("base", [*case.changes, times]))
     rows, _, _ = ended("detachment", "midpoint")
     assert status == "completed" and len(rows) > 3 and rows[:-1] == without[:len(rows) - 1]
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", ["detachment", "upstream"])
-def test_a_run_stopped_after_every_step_ends_at_the_same_event(name, tmp_path):
-    case = CASES[name]
-    check_parts(load_scene("base", [*case.changes, *case.limit]), tmp_path)
 
 
 @pytest.mark.parametrize("first", ["detachment", "tearing"])

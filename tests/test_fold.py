@@ -32,7 +32,6 @@ from repro.results import read_table
 from repro.runs.status import is_over
 from repro.scene import load_scene
 from tests.shell import read_record, state
-from tests.test_resume import check_parts
 from verification.evidence.writing import append
 from verification.problems import family
 
@@ -74,20 +73,6 @@ def test_a_fold_ends_a_run(tmp_path, capsys):
     assert 1 < begun < 1.001 * table["time_h"][-1], "the end of the first step below CREASE, to the printed digits"
     before = state(folder)
     assert main(command) == 0 and main(["run", "--resume", str(folder)]) == 0 and state(folder) == before
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("rheology", ["stressed", "stress_free"])
-def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, rheology):
-    """A checkpoint also holds the warning and the last shape, which is the reference of strain for stress-free biomass.
-    That run completes, and its smallest stretch is that of the last step."""
-    end = 2.0 if rheology == "stress_free" else 5.3
-    scene = plug(f"growth.new_biomass={rheology}", f'growth.end="{end} h"', f'output.times=["1 h", "{end} h"]')
-    check_parts(scene, tmp_path)
-    if rheology == "stress_free":
-        stretches = read_table(tmp_path / "whole" / "timeseries.csv")["surface_stretch_min"]
-        assert read_record(tmp_path / "whole")["status"] == "completed"
-        assert stretches[0] == 1 and (stretches[1:] > CREASE).all() and (stretches[1:] < 1 - 1e-6).all()
 
 
 @cache
@@ -172,7 +157,7 @@ def test_the_surface_folds_below_biots_limit_and_not_above(theta):
 @pytest.mark.parametrize("factor", [0.52, 1.94])
 def test_a_density_just_within_its_bounds_is_accepted(factor):
     pore = multiplied(factor, compressed(1.5), None).pore
-    refuse_density(pore, plug().kinetics.maximum_density)
+    assert refuse_density(pore, plug().kinetics.maximum_density) is None
 
 
 @pytest.mark.parametrize("theta, kind", [(3.0, repro.Fold), (1.5, SimulationError)])

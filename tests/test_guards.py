@@ -166,9 +166,9 @@ def quadratures_apart(scene, pore, state):
     return abs(fine - coarse) / coarse
 
 
-def test_two_quadratures_of_the_uptake_may_differ_by_five_percent():
+def test_two_quadratures_of_the_uptake_may_differ_by_five_percent(monkeypatch):
     """Substrates that fill a strip of 2 um alone are mixed with the supply until both differ by 4.9 and 5.1 %. Linear
-    elements lump the uptake at their nodes, so both quadratures are the same there."""
+    elements lump the uptake at their nodes, so both quadratures are the same there. Every solution is judged."""
     scene, pore, solved = starved()
     sink = Sink(pore.active)
     x = pore.space.points[:, 0]
@@ -182,14 +182,6 @@ def test_two_quadratures_of_the_uptake_may_differ_by_five_percent():
         part = brentq(lambda part, aim=aim: quadratures_apart(scene, pore, mixed(middle, part)) - aim, 0.0, 1.0)
         with nullcontext() if aim < 0.05 else pytest.raises(Unresolved, match="differ by 5.1 % .up to 5 % is accepted"):
             transport._refuse_unresolved(solved.problem, sink, mixed(middle, part))
-
-
-def test_the_difference_of_two_quadratures_in_a_solution_decides(monkeypatch):
-    """It is about 0.1 % in these fronts. A limit a thousandth below it refuses the solution, one above accepts it."""
-    scene, pore, solved = starved()
-    difference = quadratures_apart(scene, pore, solved.concentrations)
-    assert difference > 1e-4
-    for part, refused in ((1.001, False), (0.999, True)):
-        monkeypatch.setattr(transport, "APART", part * difference)
-        with pytest.raises(Unresolved, match="two quadratures") if refused else nullcontext():
-            solve(scene, pore)
+    monkeypatch.setattr(transport, "APART", 1e-4)
+    with pytest.raises(Unresolved, match="two quadratures"):
+        solve(scene, pore)

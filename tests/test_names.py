@@ -3,6 +3,7 @@
 import errno
 import io
 import os
+import re
 import shutil
 import signal
 import socket
@@ -20,7 +21,7 @@ from repro.errors import OutputError
 from repro.results.files import read_sealed
 from repro.runs.folder import locked
 from repro.scene import SceneError
-from tests.shell import BRIEF, flags, start, wait_for
+from tests.shell import BRIEF, flags, rows, start, wait_for
 
 #: A name that is no UTF-8, one of the control and quoting characters, one that looks like an option, and a long one.
 NAMES = {"bytes": os.fsdecode(b"\xff\xfe x"), "newline": "a\nb\t'\x1b[2J$x_", "emoji": "\U0001f9eb \xb5",
@@ -196,10 +197,11 @@ def is_newer(run, before):
 @pytest.mark.parametrize("command", ["run", *(pytest.param(command, marks=pytest.mark.thorough)
                                              for command in ("resume", "sweep"))])
 @pytest.mark.parametrize("number", [
-    pytest.param(number, id=number.name, marks=() if number == signal.SIGUSR1 else pytest.mark.thorough)
+    pytest.param(number, id=number.name, marks=() if number == signal.SIGTERM else pytest.mark.thorough)
     for number in SIGNALS])
 def test_every_signal_stops_every_command_and_saves(tmp_path, command, number):
-    """The run ends with 128 + the number of the signal, has a checkpoint, and its command continues it."""
+    """The run ends with 128 + the number of the signal, has a checkpoint, and its command continues it. The message has
+    the time of the last step, and not that of the run's end."""
     out = tmp_path / "out"
     run = out if command != "sweep" else out / "runs"
     arguments = {"sweep": ["sweep", "base", "--vary", "pore.width=50 um", "--workers", "1", "--quiet", "--out", out],
@@ -211,6 +213,11 @@ def test_every_signal_stops_every_command_and_saves(tmp_path, command, number):
         os.killpg(process.pid, number)
         message = process.communicate(timeout=60)[1]
         assert process.returncode == 128 + number, message
+        assert message.endswith(f"continues the {'sweep' if command == 'sweep' else 'run'}\n")
+        assert "Traceback" not in message
+        if command != "sweep":
+            (stopped,) = re.findall(r" at t = (\S+) h; the results", message)
+            assert float(rows(out / "timeseries.csv")[-1]["time_h"]) <= float(stopped) < 19.4
         records = [read_sealed(path) for path in run.rglob("run.json")]
         assert [record["status"] for record in records] == ["interrupted"]
         assert list(run.rglob("checkpoint.state"))

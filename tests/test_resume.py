@@ -3,7 +3,6 @@
 import json
 import random
 import re
-import signal
 from contextlib import suppress
 from pathlib import Path
 from shutil import copytree
@@ -15,11 +14,7 @@ import pytest
 from repro import timing
 from repro.cli import main
 from repro.errors import Interrupted, SimulationError
-from repro.march.simulation import steps
-from repro.model import flow, growth, traction
-from repro.model.interface import LAPLACIAN
-from repro.results import columns
-from repro.results.quantities import Quantity
+from repro.model import growth
 from repro.runs import execution
 from repro.runs.checkpoint import NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
@@ -39,7 +34,6 @@ from tests.shell import (
     refusal,
     resume_run,
     rewrite,
-    rows,
     run_and_wait,
     start_run,
     stop_every,
@@ -47,12 +41,14 @@ from tests.shell import (
 )
 
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
+#: An aggregate near the ends of the pore: each run has a warning.
+WARNED = ('pore.length="90 um"',)
 SCENES = {
     "fast, jumps": ('numerics.preset="fast"', 'growth.end="0.8 h"', 'substrates.donor.supply='
                     '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]',
                     'output.times=["0.1 h", "0.3 h", "0.4 h", "0.7 h"]'),
     "paper, rows within steps": ('growth.end="0.7 h"', 'output.times=["0.05 h", "0.1 h", "0.4 h", "0.47 h"]'),
-    "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
+    "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT, *WARNED,
                                         'output.times=["0.6 h"]'),
 }
 THOROUGH_SCENES = {
@@ -67,6 +63,10 @@ THOROUGH_SCENES = {
     "gear with forces": ("numerics.refinement=0.3", 'numerics.transport="gear"', 'growth.fluid_forces="included"',
                          'growth.end="0.6 h"'),
     "fast, stress-free": ('numerics.preset="fast"', 'growth.new_biomass="stress_free"', *CONTACT),
+    "fast, a missed tolerance": ('numerics.preset="fast"', "numerics.tolerance=1e-12", "growth.time_step=1 h",
+                                 "growth.end=0.0205 h", 'output.times=["4.2e-3 h", "0.0205 h"]'),
+    "fast, to a detachment": ('numerics.preset="fast"', "growth.time_step=0.5 h", "growth.end=3 h",
+                              "growth.wall=bonded", "growth.bonding_strength=0.002 MPa"),
 }
 
 
@@ -96,43 +96,6 @@ def check_parts(scene, folder):
 def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, name):
     """No warning occurs."""
     check_parts(load_scene("base", {**SCENES, **THOROUGH_SCENES}[name]), tmp_path)
-
-
-def drag(scene, result):
-    """The force (MPa um) of the aggregate on the water along the pore. It is directed against the flow."""
-    drive = scene.flow
-    head_per_rate = drive.kinematic_viscosity / drive.gravity
-    forces = traction.nodal(result.pore.space, result.solved.flow, head_per_rate, LAPLACIAN)
-    return -flow.MPA_PER_UM * drive.density * drive.gravity * forces[result.pore.mesh.body, 0].sum()
-
-
-DRAG = Quantity("drag", "force on the water", "-", drag, needs="aggregate and flow", signed=True)
-
-
-@pytest.fixture
-def a_negative_column(monkeypatch):
-    """A contributor's column, added by its entry in the list of columns alone."""
-    monkeypatch.setattr(columns, "SERIES", (*columns.SERIES, DRAG))
-    columns.COLUMNS.append(DRAG.name)
-    yield
-    columns.COLUMNS.remove(DRAG.name)
-
-
-def test_a_run_with_a_negative_column_resumes_from_its_checkpoint(tmp_path, a_negative_column):
-    """It resumes after its last step and not at t = 0; its files are those of the uninterrupted run. Without flow the
-    column is empty."""
-    scene = load_scene("base", SCENES["paper, rows within steps"])
-    run(scene, tmp_path / "continuous")
-    interrupt_run(scene, tmp_path / "parts")
-    assert resume_run(tmp_path / "parts") == 0
-    (resume_record,) = read_record(tmp_path / "parts")["resumes"]
-    assert resume_record["time_h"] > 0
-    assert files(tmp_path / "parts") == files(tmp_path / "continuous")
-    values = [float(row["drag"]) for row in rows(tmp_path / "parts" / "timeseries.csv")]
-    assert len(values) == 5 and max(values) < 0
-    diffusion = load_scene("base", ['growth.end="0 h"'], unset=["flow"])
-    ((_, instant),) = steps(diffusion)
-    assert columns.row(diffusion, instant)["drag"] is None
 
 
 @pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*BRIEF), "--force", "--out"]],
@@ -263,22 +226,6 @@ def test_a_failure_names_the_last_good_state(tmp_path, monkeypatch):
     monkeypatch.setattr(growth, "MOST_ITERATIONS", most)
     assert resume(tmp_path / "run") == "completed"
     assert matches_uninterrupted(scene, tmp_path / "run")
-
-
-@pytest.mark.exact_lengths
-@pytest.mark.parametrize("number, status", [
-    pytest.param(signal.SIGINT, 130, marks=pytest.mark.thorough), (signal.SIGTERM, 143)])
-def test_a_run_ended_by_a_signal_resumes(tmp_path, number, status):
-    """It ends with one line and the results so far. The resumed run has the bits of the uninterrupted one."""
-    process = start_run("base", "--set", "growth.end=1.6 h", "--out", tmp_path)
-    wait_for((tmp_path / "fields" / "fields_0002.vtu").exists, process)
-    process.send_signal(number)
-    message = process.communicate(timeout=60)[1]
-    assert process.returncode == status and message.endswith("continues the run\n")
-    assert f" at t = {float(rows(tmp_path / 'timeseries.csv')[-1]['time_h']):g} h; the results" in message
-    assert "Traceback" not in message and read_record(tmp_path)["status"] == "interrupted"
-    assert len((tmp_path / "timeseries.csv").read_text().splitlines()) > 3
-    assert resume(tmp_path) == "completed" and matches_uninterrupted(load_scene("base", ["growth.end=1.6 h"]), tmp_path)
 
 
 @pytest.mark.thorough

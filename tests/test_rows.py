@@ -41,11 +41,6 @@ def test_ends_and_top_are_those_of_the_boundary_between_its_nodes(order):
     assert difference.min() > 2e-4 if order > 1 else difference.max() == 0
 
 
-def test_a_row_states_whether_any_of_its_steps_made_a_mesh():
-    scene, pore = coarse_base(1)
-    assert [row_of(scene, pore, remeshes=count)["remeshed"] for count in (0, 1, 2, 7)] == [0, 1, 1, 1]
-
-
 def test_biomass_is_reported_for_a_scene_without_growth():
     scene = load_scene("initial_mesh", ["substrates={}", "aggregate.inert_fraction=0.3"])
     row = row_of(scene, seeded(scene))

@@ -10,7 +10,6 @@ import numpy as np
 import pint
 import pytest
 
-from repro.cli import docs, main
 from repro.scene import Scene, exact, files, load_scene, load_tables, parse_scene, scene_tables, units
 from repro.scene.reading import NOT_MODELLED, SCOPE, toml
 from tests.blocks import ROOT
@@ -453,15 +452,6 @@ def test_several_tables_of_a_section_are_answered_with_the_page(section):
 def test_a_misspelt_key_is_not_one_of_another_model(key):
     tables = reduce(lambda inner, name: {name: inner}, reversed((key[:-1] + "x").split(".")), {})
     assert f"(did you mean {key.rpartition('.')[2]}?)" in refusal(tables)
-
-
-def test_the_page_that_refusals_cite_is_printed(capsys):
-    """The command prints the page of the repository, which the package contains."""
-    command = SCOPE.strip("`").split()
-    assert main(command[1:]) == 0
-    page = (ROOT / "docs" / "scope.md").read_text(encoding="utf-8")
-    assert capsys.readouterr().out == docs._without_links(page)
-    assert main(["docs"]) == 0 and "quantities" in capsys.readouterr().out
 
 
 # ---------------------------------------------------------------- files

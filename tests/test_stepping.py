@@ -1,7 +1,7 @@
 """Steps of the midpoint rule: where they end, which are accepted, and what depends on rows and ends.
 
-The case coupling-midpoint-order tests their order, `test_balances.py` their ledgers, `test_pace.py` their length, and
-the case hard-07-contact that contact ends a step.
+The case coupling-midpoint-order tests their order, the case coupling-ledger their ledgers, `test_pace.py` their
+length, and the case hard-07-contact that contact ends a step.
 """
 import json
 from dataclasses import replace

@@ -1,18 +1,14 @@
-"""The traction that keeps a sliding contact surface in place: a closed form on both walls, its limit as the
-mesh is refined, and where it acts. `test_derived.py` tests the traction that a run reports."""
-from functools import cache
+"""The traction that keeps a sliding contact surface in place: a closed form on both walls, and where it acts.
+`test_derived.py` tests the traction that a run reports."""
 
 import numpy as np
 import pytest
 
-from repro.fem.outline import polygon
-from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
+from repro.fem.walls import BOTTOM, FREE, TOP
 from repro.model import growth, mechanics
-from repro.model.mechanics import Mechanics, equilibrium, supports_of
+from repro.model.mechanics import supports_of
 from repro.model.meshing import seeded
-from repro.model.support import Support
-from tests.strategies import EVERY_ORDER, ORDERS, body_of, coarse_base, meshed
-from tests.strategies import seed as disc
+from tests.strategies import EVERY_ORDER, ORDERS, coarse_base
 from verification.problems.schemes import exchange, load_scene
 
 
@@ -44,7 +40,8 @@ def on_sides(seed, traction):
 @EVERY_ORDER
 def test_simple_shear_between_two_walls_is_exact(order):
     """F = [[1, g], [0, 1]] at P = g^2 / 3 has the traction g along both walls, and g upwards and downwards on the
-    sides. The fixed points move apart by g times the width. A force at a point could not give this shape."""
+    sides. The fixed points move apart by g times the width. A force at a point could not give this shape. The
+    derivative is exact, so each step of Newton's method squares the defect (measured 2 steps)."""
     scene, seed = block(order)
     g, X = 0.3, seed.body.reference
     prescribed = X.copy()
@@ -61,69 +58,8 @@ def test_simple_shear_between_two_walls_is_exact(order):
     exact = X + g * X[:, 1:] * [1.0, 0.0]
     assert shapes[0].position == pytest.approx(exact, abs=1e-8)
     assert shapes[0].pressure == pytest.approx(np.full(seed.body.solid.shape.corners, g**2 / 3), abs=1e-8)
+    assert shapes[0].iterations <= 3
     assert np.abs(shapes[1].position - exact)[upper].max() > 0.1
-
-
-def outlines(shape, geometry, refinement):
-    """A half-disc of 10 um on the lower wall, or a block of 20 by 20 um from wall to wall."""
-    if shape == "half-disc":
-        return disc(10.0, refinement, geometry), 50.0
-    corners = np.array([(-10.0, 0.0), (-10.0, 20.0), (10.0, 20.0), (10.0, 0.0)])
-    return polygon(corners, channel_walls(20.0), geometry), 20.0
-
-
-@cache
-def pulled(shape, geometry, refinement):
-    """{wall: um by which the middle between its contact lines moves} if a force of 1 um pulls evenly at all parts of
-    the aggregate, and Newton's iterations."""
-    outline, width = outlines(shape, geometry, refinement)
-    grid, around = meshed(outline, width, refinement, ends=(-12.0, 12.0), film=width)
-    body, constrained, rim = body_of(grid, around)
-    forces = np.zeros(constrained.shape)
-    forces[:, 0] = body.at.assemble(body.at.load(body.at.dx)) / body.at.dx.sum()
-    walls = [wall for wall in (BOTTOM, TOP) if (around.wall == wall).any()]
-    supports = [Support.on(rim[around.fixed & (around.wall == wall)][0], rim[around.edges_on(wall)], body.reference)
-                for wall in walls]
-    X = body.reference
-    rest = growth.equilibrium(body, np.ones_like(body.at.dx), X, np.zeros(body.shape.corners), constrained, X,
-                              forces=forces, supports=supports)
-    ends = {wall: rim[around.contact_ends & (around.wall == wall)] for wall in walls}
-    return {wall: np.mean((rest.position - X)[nodes, 0]) for wall, nodes in ends.items()}, rest.iterations
-
-
-def test_the_displacement_under_a_force_has_a_limit():
-    """A tenth of the modulus times the radius acts on a half-disc. Quadratic elements are at the limit to 0.5 %, and
-    five meshes of linear ones approach it. A force at a point would add F ln 2 / (2 pi G) = 0.11 um for each of them.
-
-    The derivative is exact, so each step of Newton's method squares the defect: from 0.1, four steps reach 1e-11."""
-    moved = [pulled("half-disc", 2, refinement)[0][BOTTOM] for refinement in (0.5, 1, 2)]
-    assert moved[:2] == pytest.approx([moved[2]] * 2, rel=5e-3)
-    linear = [pulled("half-disc", 1, refinement) for refinement in (0.5, 1, 2, 4, 8)]
-    errors = np.abs([each[BOTTOM] - moved[2] for each, _ in linear])
-    assert (np.diff(errors) < 0).all() and errors[-1] < 0.05 * moved[2]
-    assert max(iterations for _, iterations in linear) <= 5
-
-
-@pytest.mark.parametrize("wall", (BOTTOM, TOP))
-def test_each_wall_bears_half_of_the_force_on_a_block(wall):
-    """Both ends of a block move alike, to the error of its corners, on linear and quadratic elements."""
-    half = pulled("block", 2, 0.5)[0]
-    assert half[wall] == pytest.approx(half[BOTTOM], rel=0.1)
-    assert pulled("block", 1, 1.0)[0][wall] == pytest.approx(half[wall], rel=0.3)
-
-
-@EVERY_ORDER
-def test_without_forces_one_surface_alone_moves_as_without_a_traction(order):
-    """The forces of growth along the pore add up to zero, so the traction is zero."""
-    scene, seed = coarse_base(order)
-    slope = seed.body.reference[seed.body.solid.shape.cells, 0] @ seed.body.solid.shape.table.values.T
-    grown = seed.with_body(theta=seed.body.theta * (1.2 + 0.02 * slope))
-    mechanics = Mechanics.of(scene)
-    none = np.zeros((len(seed.mesh.body), 2))
-    assert not supports_of(seed.body.solid, seed, None)
-    assert supports_of(seed.body.solid, seed, none)
-    shapes = [equilibrium(mechanics, grown, grown, forces)[0].mesh.points for forces in (None, none)]
-    assert shapes[1] == pytest.approx(shapes[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("wall, walls", [("sliding", [BOTTOM, TOP]), ("bonded", [TOP])])

@@ -1,6 +1,6 @@
 """Quasi-steady substrates (7)-(13) with elements of every order: solutions without biomass, starts of Newton's method,
 and refusals. Cases of the stage transport test closed forms, other codes, the balance, starved pores, scaling and the
-mean biomass of a step. `test_balances.py` tests that uptake follows from rates and concentrations, `test_guards.py`
+mean biomass of a step. `test_derived.py` tests that uptake follows from rates and concentrations, `test_guards.py`
 that two quadratures of the uptake agree."""
 from contextlib import nullcontext
 from dataclasses import replace

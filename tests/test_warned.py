@@ -20,7 +20,7 @@ from repro.runs.execution import resume, run
 from repro.scene import load_scene
 from tests import pages
 from tests.pages import Page, cached_run, text_of
-from tests.shell import flags, interrupt_run, lasting_record, read_record
+from tests.shell import flags, interrupt_run, read_record
 
 CHANGES = ("numerics.preset=fast", "growth.time_step=0.6 h", "growth.end=1 h", "pore.length=100 um",
            "aggregate.radius=16 um", "output.every=0.5 h")
@@ -67,15 +67,6 @@ def test_a_run_without_warnings_has_an_empty_list(tmp_path, capsys):
     assert "aria-label=\"warnings\"" not in text_of(tmp_path / "run")
 
 
-def test_a_resume_keeps_the_warnings(tmp_path, checked):
-    """They are not computed again."""
-    scene = load_scene("wide", CHANGES)
-    interrupt_run(scene, tmp_path, after=2)
-    resume(tmp_path)
-    assert read_record(tmp_path)["warnings"] == checked
-    assert lasting_record(tmp_path) == lasting_record(cached_run(scene))
-
-
 def test_a_failure_of_the_warnings_ends_no_run(tmp_path, monkeypatch):
     monkeypatch.setattr(simplifications.numbers, "numbers", Mock(side_effect=OverflowError("math range error")))
     run(load_scene("flow_only"), tmp_path)
@@ -116,16 +107,6 @@ def test_a_missed_tolerance_is_reported_with_the_largest_estimate(tmp_path, caps
     assert all(step_control.duration >= 1e-3 for step_control in ends.values()), "no shorter step is tried"
     assert [int(part) for part in match.groups()[:2]] == [len(short), count] and count > len(short) > 15
     assert float(match[3]) == pytest.approx(max(short), rel=0.06)
-
-
-@pytest.mark.thorough
-def test_a_resumed_run_counts_the_steps_before(tmp_path):
-    scene = load_scene("base", MISSED)
-    interrupt_run(scene, tmp_path, after=9)
-    before = missed_tolerance(read_record(tmp_path))
-    resume(tmp_path)
-    assert lasting_record(tmp_path) == lasting_record(cached_run(scene))
-    assert before not in ([], missed_tolerance(read_record(tmp_path)))
 
 
 @pytest.mark.parametrize("sets, count", [(MISSED, 1), (MET, 0)])

@@ -728,7 +728,7 @@ MUTANTS = (
          "_Surface._windows",
          "length = min(LENGTH * width, places[-1] - places[0])",
          "length = min(width, places[-1] - places[0])",
-         "tests/test_detachment.py::test_means_of_a_traction_are_those_of_its_integral")),
+         "tests/test_derived.py::test_the_columns_of_the_wall_traction_are_what_their_names_say[2-late-2048-stress]")),
     *changes(
         "repro/march/ends.py",
         ("strength-of-the-other",

@@ -23,6 +23,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -85,9 +86,9 @@ class Outcome:
 def load_mutants() -> dict[str, tuple[Mutant, ...]]:
     """Mutants by stage. "results" has those of texts for users. Raises MutantError if two have the same id."""
     stages = {name: import_module(f"verification.mutants.{name}").MUTANTS for name in (*STAGES, "results")}
-    ids = [mutant.id for mutants in stages.values() for mutant in mutants]
-    if repeated := {id for id in ids if ids.count(id) > 1}:
-        raise MutantError(f"used twice: {', '.join(sorted(repeated))}")
+    counts = Counter(mutant.id for mutants in stages.values() for mutant in mutants)
+    if repeated := sorted(id for id, count in counts.items() if count > 1):
+        raise MutantError(f"used twice: {', '.join(repeated)}")
     return stages
 
 
