@@ -104,6 +104,20 @@ def test_the_numbers_of_base_are_those_of_table_1():
     assert computed["fluid stress over modulus"].end == pytest.approx(998 * 9.81 * 1e-5 / 1e4, rel=1e-12)
 
 
+def test_half_a_pore_has_the_numbers_of_the_whole_one():
+    """A seed and its mirror image beyond a plane of symmetry, beside the same seed in a pore of twice the width. The
+    whole pore of this pair has one aggregate, so a Damkoehler number is half as large."""
+    scenes = [load_scene("base", ["flow.mean_velocity=3 m/day", f"pore.width={width} um", f"pore.upper_wall={wall}"],
+                         unset=["flow.head"]) for width, wall in ((25, "symmetry"), (50, "no slip"))]
+    half, whole = ({number.name: number for number in numbers.numbers(each, each.flow.mean_velocity)}
+                   for each in scenes)
+    assert half.keys() == whole.keys() and "Reynolds" in half
+    for name, number in whole.items():
+        share = 2 if name.startswith("Damkoehler") else 1
+        if name != "cell Peclet":
+            assert half[name].start == pytest.approx(share * number.start, rel=1e-12), name
+
+
 @pytest.mark.parametrize("name, overrides, reach, keys", [
     ("base", (), None, []), ("base", ("numerics.preset=fast",), None, []),
     ("base", ("numerics.preset=accurate",), None, []), ("flow_only", (), None, []), ("initial_mesh", (), None, []),

@@ -127,7 +127,7 @@ def numbers(scene: Scene, speed: float | None, end: Sizes | None = None) -> list
     """
     computed: list[Number] = []
     if speed is not None:
-        reynolds = speed * scene.pore.width / scene.flow.kinematic_viscosity
+        reynolds = speed * _whole_width(scene) / scene.flow.kinematic_viscosity
         computed.append(Number("Reynolds", reynolds, None, "u W / nu"))
     if speed is not None and scene.substrates:
         computed += _transported(scene, speed)
@@ -136,6 +136,11 @@ def numbers(scene: Scene, speed: float | None, end: Sizes | None = None) -> list
     if scene.growth:
         computed += _grown(scene, speed, end)
     return computed
+
+
+def _whole_width(scene: Scene) -> float:
+    """W (um), with the mirror image beyond a plane of symmetry."""
+    return whole_width(walls_of(scene))
 
 
 def evaluate_at_largest(scene: Scene, velocity: float | None,
@@ -156,7 +161,7 @@ def evaluate_at_largest(scene: Scene, velocity: float | None,
 
 def _transported(scene: Scene, speed: float) -> Iterator[Number]:
     for name, substrate in scene.substrates.modelled.items():
-        value = speed * scene.pore.width / substrate.diffusivity
+        value = speed * _whole_width(scene) / substrate.diffusivity
         yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
     yield Number("cell Peclet", 1.5 * speed * sized(scene).largest / slowest(scene), None,
                  "1.5 u h / D, h of the largest elements, the smallest D")
@@ -186,7 +191,7 @@ def _taken_up(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[
 
 
 def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Number]:
-    across = half_length(scene) if speed is None else scene.pore.width
+    across = half_length(scene) if speed is None else _whole_width(scene)
     length = "l half of the meshed part" if speed is None else "l = W"
     yield Number("transport over growth time",
                  fastest_growth(scene) * across**2 / slowest(scene), None,
@@ -204,7 +209,7 @@ def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Num
 def half_length(scene: Scene) -> float:
     """Half of the length (um) that is meshed at t = 0."""
     seed = initial_outline(scene)
-    first, last = meshed_extent(seed, whole_width(walls_of(scene)), scene.pore.length,
+    first, last = meshed_extent(seed, _whole_width(scene), scene.pore.length,
                                 scene.numerics.whole_pore)
     return (last - first) / 2
 
@@ -218,7 +223,7 @@ def stresses(scene: Scene, speed: float, end: Sizes | None) -> tuple[float, floa
     """
     drive = scene.flow
     width = scene.pore.width
-    whole = whole_width(walls_of(scene))
+    whole = _whole_width(scene)
     modulus = scene.growth.shear_modulus
     viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / modulus
     shear = 6 * viscosity * speed / whole
