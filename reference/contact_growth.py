@@ -10,7 +10,7 @@ value (um) of
     min(film, tan(angle) d) - gap
 
 on the free surface beyond it. It is zero for both lines. At a line itself both terms are zero, and beside it the
-surface opens like the root of d. The first half of the distance film / tan(angle) is therefore left out: a converged
+surface opens like the root of d. The first tenth of the distance film / tan(angle) is therefore left out: a converged
 surface comes nearest to the wall beyond it. MINPACK's hybrid method solves for the angles.
 """
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from reference.quadratic_growth import Contact, Equilibrium
 #: Angles (rad) of the nodes that become the contact lines, and of the ends of the arc.
 NODES = np.pi * np.array([0.0, 0.25, 0.75, 1.0])
 #: The part of film / tan(angle) beside a line that is left out, and places on each edge of the arc.
-BESIDE, PER_EDGE = 0.5, 40
+BESIDE, PER_EDGE = 0.1, 40
 #: Accuracy of both angles (rad), and the smallest change for their derivatives.
 ACCURACY, CHANGE = 1e-7, 1e-3
 #: The first step of the search over the angles, at most.

@@ -107,7 +107,7 @@ def test_each_of_two_aggregates_grows_and_moves_as_in_a_pore_of_its_own(order, w
         assert of_both.pore.bodies[number].mass == pytest.approx(alone.mass, rel=1e-13)
     assert of_both.pore.mass == pytest.approx(of_one.pore.mass + of_image.pore.mass, rel=1e-13)
     loading = Loading.of(scene)
-    peaks = [adhesion.tensile_peak(loading, pore).value for pore in (of_one.pore, of_both.pore)]
+    peaks = [adhesion.tensile_peak(loading, pore, None).value for pore in (of_one.pore, of_both.pore)]
     assert peaks[1] == pytest.approx(peaks[0], rel=1e-5)
     compression = folding.most_compressed(Compression(), of_both.pore)
     assert compression.stretch == min(1.0, *(each.least for each in surfaces(of_both.pore)))

@@ -115,10 +115,10 @@ def test_clearance_sees_a_film_that_runs_along_the_wall(gap, clearance, mirror):
     assert values[TOP, -upstream] > 1
 
 
-@pytest.mark.parametrize("length, clearance", [(3.2, None), (3.5, -0.708), (4.5, -0.708)])
+@pytest.mark.parametrize("length, clearance", [(1.25, None), (1.45, -0.708), (4.5, -0.708)])
 @pytest.mark.parametrize("mirror", [False, True])
 def test_clearance_ignores_the_angle_close_to_the_line(length, clearance, mirror):
-    """A wedge of 5 degrees beside the line ends in a step. Half of film / tan(angle) is 3.33 um."""
+    """A wedge of 5 degrees beside the line ends in a step. A fifth of film / tan(angle) is 1.33 um."""
     low = 20.0 - length * np.tan(np.radians(5.0))
     rim = [[-60.0, 0.0], [-5.0 - length - 0.01, 16.0], [-5.0 - length, low], [-5.0, 20.0], [5.0, 20.0], [30.0, 0.0]]
     outline = polygon(np.array(rim), channel_walls(20.0), 2)

@@ -159,7 +159,7 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
         peak = adhesion.wall_peak(ends.loading, pore, solved)
         yield _detachment(ends.bonding, pore, peak, "detaches", "its wall must bear")
     if ends.tensile is not None:
-        peak = adhesion.tensile_peak(ends.loading, pore)
+        peak = adhesion.tensile_peak(ends.loading, pore, solved)
         yield _detachment(ends.tensile, pore, peak, "tears", "its tensile stress is")
 
 

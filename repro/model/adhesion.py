@@ -12,6 +12,10 @@ with the means of the pull, from the aggregate into the wall, and of the shear o
 20 around x. The stress at a contact line may be singular. A mean over a length converges as the
 mesh is refined. The tensile stress is a weighted mean over the points within W / 20 of a node.
 
+A shape that was carried to a new mesh is in equilibrium on the old one. Its stresses at contact
+lines err by up to a factor of two on the new mesh. So both stresses are those of the equilibrium on
+the present mesh, with the same contact surfaces and the present forces of the water.
+
 Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
 stress of growth alone.
 """
@@ -19,6 +23,7 @@ stress of growth alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,12 +34,13 @@ from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
 from repro.model.flow import Flow
 from repro.model.interface import Interface, interface_of
+from repro.model.mechanics import Mechanics, equilibrium
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
 from repro.model.solid import Solid
 from repro.model.solving import Solved
 from repro.scene import Flow as Drive
-from repro.scene import Growth, Scene, at_time, needed
+from repro.scene import Growth, Numerics, Scene, at_time, needed
 
 #: The length of the means, over the pore's width.
 LENGTH = 1 / 20
@@ -42,21 +48,24 @@ LENGTH = 1 / 20
 PARTS = 64
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Loading:
     """Data from which stresses and forces are computed.
 
-    growth: section [growth]; drive: section [flow], None without flow; interface: form of the flow.
+    growth, numerics: sections of the scene; drive: section [flow], None without flow; interface:
+    form of the flow.
     """
 
     growth: Growth
+    numerics: Numerics
     drive: Drive | None
     interface: Interface
 
     @classmethod
     def of(cls, scene: Scene) -> Loading:
         """The loading of a scene with growth."""
-        return cls(scene.growing.growth, scene.flow, interface_of(scene.numerics.interface))
+        return cls(scene.growing.growth, scene.numerics, scene.flow,
+                   interface_of(scene.numerics.interface))
 
 
 @dataclass(frozen=True)
@@ -155,10 +164,28 @@ def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
     return forces
 
 
+@lru_cache(maxsize=1)
+def at_rest(loading: Loading, pore: Pore, solved: Solved) -> Pore:
+    """The pore with its aggregates in equilibrium on its mesh.
+
+    Contact surfaces stay. Raises GrowthError if there is no equilibrium.
+    """
+    mechanics = Mechanics(loading.growth, loading.numerics)
+    forces = None
+    if loading.growth.has_fluid_forces:
+        forces = fluid_forces(loading, pore, solved) / loading.growth.shear_modulus
+    rest = pore
+    for number, region in enumerate(pore.mesh.regions):
+        seen = rest.focused(number)
+        own = None if forces is None else forces[np.searchsorted(pore.mesh.body, region.nodes)]
+        rest, _ = equilibrium(mechanics, seen, seen, own)
+    return rest.focused(pore.focus)
+
+
 def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
-    """Largest mean stress that a wall bears, with its coordinates."""
+    """Largest mean stress that a wall bears in equilibrium, with its coordinates."""
     forces = np.zeros_like(pore.mesh.points)
-    forces[pore.mesh.body] = wall_forces(loading, pore, solved)
+    forces[pore.mesh.body] = wall_forces(loading, at_rest(loading, pore, solved), solved)
     peaks = []
     for outline, region in zip(pore.outlines, pore.mesh.regions):
         touched = outline.edge_wall
@@ -238,15 +265,16 @@ class _Surface:
         return (ahead - np.interp(starts, places, total)) / length
 
 
-def tensile_peak(loading: Loading, pore: Pore) -> Peak:
-    """Largest principal value of the mean stress around a node.
+def tensile_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
+    """Largest principal value of the mean stress around a node in equilibrium.
 
     The mean has the weight 1 - (d / L)^2 at a distance d < L = W / 20 from the node. It is taken
     over the points where growth is integrated. On a mesh without a point so near to a node, L is
     twice the least distance.
     """
-    peaks = [_tensile_peak(loading, pore, body.solid, region)
-             for body, region in zip(pore.bodies, pore.mesh.regions)]
+    rest = at_rest(loading, pore, solved)
+    peaks = [_tensile_peak(loading, rest, body.solid, region)
+             for body, region in zip(rest.bodies, rest.mesh.regions)]
     return max(peaks, key=lambda peak: peak.value)
 
 

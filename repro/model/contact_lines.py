@@ -8,9 +8,9 @@ beyond a line is the smallest value on the free surface of
 
 at the distance d from the line along the wall. If it is negative, a film or a wedge is too thin.
 Beside the line the surface opens like the root of d, and discretely at an angle that depends on its
-arcs. So the angle is tested at distances of BESIDE film / tan(angle) or more, where a converged
-surface comes nearest to the wall. Closer to the line a part of it suffices, OPENING tan(angle), so
-that no arc passes the wall.
+arcs. So the angle is tested at distances of ANGLE_FROM film / tan(angle) or more, where a converged
+surface comes nearest to the wall. Closer to the line a part of it suffices, PART_OF_ANGLE
+tan(angle), so that no arc passes the wall.
 The contact surface is the smallest one without a negative clearance, so each line advances until
 its clearance vanishes. The secant method, safeguarded by bisection, searches for all lines at once.
 Each trial is an equilibrium of the aggregate.
@@ -25,18 +25,18 @@ from typing import TypeAlias
 import numpy as np
 
 from repro.errors import GrowthError
-from repro.fem.outline import Outline, parabola
+from repro.fem.outline import Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Walls, numbered
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 CLOSE = 2e-3
 #: Least distance from a line at which the angle is tested, over film / tan(angle). The converged
-#: surfaces of an independent code come nearest to the wall at 0.51 to 0.99 of this distance.
-BESIDE = 0.5
-#: Error allowed to the interpolated place at this distance, in the same unit.
-NEARLY = 0.005
+#: surfaces of reference/gold come nearest to the wall at 0.31 to 1 of film / tan(angle).
+ANGLE_FROM = 0.2
+#: Relative round-off of a distance.
+ROUND_OFF = 1e-9
 #: Tangent of the least angle closer to the line, over tan(angle). A converged surface is steeper.
-OPENING = 0.1
+PART_OF_ANGLE = 0.1
 #: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
 #: If an advance that is too short and one that is far enough are closer than this (arcs), the
@@ -134,8 +134,8 @@ class Clearance:
         wall = numbered(self.walls, outline.wall[node])
         gap = wall.film(points)
         needs = np.minimum(self.film, np.tan(self.angle) * distance)
-        beside_line = distance < (BESIDE - NEARLY) * self.film / np.tan(self.angle)
-        needs[beside_line] *= OPENING
+        tested_from = ANGLE_FROM * (1 - ROUND_OFF) * self.film / np.tan(self.angle)
+        needs[distance < tested_from] *= PART_OF_ANGLE
         facing = place > 0
         if outline.wall[last] == wall.number:
             # Free surface between two lines of one wall belongs to the nearer line.
@@ -153,12 +153,16 @@ class Clearance:
         points = AT_PLACES @ arcs
         place = np.arange(len(arcs))[:, None] + PLACES
         places, all_points = [place.ravel()], [points.reshape(-1, 2)]
-        distance = outwards * (points[..., 0] - arcs[0, 0, 0]) * np.tan(self.angle) / self.film
-        for change in (BESIDE, 1.0):
-            beyond = distance - change
+        nodes = outwards * (arcs[..., 0] - arcs[0, 0, 0]) * np.tan(self.angle) / self.film
+        for change in (ANGLE_FROM, 1.0):
+            beyond = nodes @ AT_PLACES.T - change
             arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
             part = beyond[arc, k] / (beyond[arc, k] - beyond[arc, k + 1])
             t = PLACES[k] + part * np.diff(PLACES)[k]
+            first, second = arc_derivatives(nodes[arc])
+            for _ in range(3):  # Newton's method; the interpolated place is near
+                error = np.einsum("ka,ka->k", parabola(t), nodes[arc]) - change
+                t = t - error / (first + second * t)
             places.append(arc + t)
             all_points.append(np.einsum("ka,kai->ki", parabola(t), arcs[arc]))
         return np.concatenate(places), np.vstack(all_points)

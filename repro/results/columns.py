@@ -194,7 +194,7 @@ SERIES = (
     *_peak("tensile_stress_max", "largest tensile stress of the aggregate",
            "largest eigenvalue of the Cauchy stress, in a mean around a node with the weight 1 - "
            "(d / L)^2 at a distance d < L = W / 20", "tensile stress",
-           lambda scene, at: _adhesion().tensile_peak(_loading(scene), at.pore)),
+           lambda scene, at: _adhesion().tensile_peak(_loading(scene), at.pore, at.solved)),
     *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
                "integral of the water's stress over the interface, or of its drag over a permeable "
                "aggregate; the head is zero at the outlet of the meshed part",

@@ -153,7 +153,8 @@ def test_plug(changes, record):
     shape = contact.expand(Mechanics.of(scene), seed, [theta * seed.body.theta]).pore
     expected = scene.growth.shear_modulus * theta ** (-2 / 3) * (1 / theta - theta)
     loading = Loading.of(scene)
-    peaks = {"walls": adhesion.wall_peak(loading, shape, None), "tensile stress": adhesion.tensile_peak(loading, shape)}
+    peaks = {"walls": adhesion.wall_peak(loading, shape, None),
+             "tensile stress": adhesion.tensile_peak(loading, shape, None)}
     record(each_at_most({name: abs(peak.value / expected - 1) for name, peak in peaks.items()}, 1e-7,
                         "F is constant: Newton's tolerance"))
 
@@ -275,4 +276,4 @@ def _bonded_peaks(refinement: float, *changes: str) -> tuple[float, float]:
     slope = seed.body.reference[seed.body.solid.shape.cells, 0] @ seed.body.solid.shape.table.values.T
     shape = contact.expand(Mechanics.of(scene), seed, [seed.body.theta * (1.1 - 0.005 * slope)]).pore
     loading = Loading.of(scene)
-    return adhesion.wall_peak(loading, shape, None).value, adhesion.tensile_peak(loading, shape).value
+    return adhesion.wall_peak(loading, shape, None).value, adhesion.tensile_peak(loading, shape, None).value
