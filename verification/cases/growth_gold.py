@@ -1,0 +1,136 @@
+"""Uniform growth into the opposite wall, and on a bonded wall, against NGSolve: another code, other elements.
+
+Substrates are at their supply everywhere and nothing decays, so theta is exp(rate t) in the whole aggregate. The
+package's presets run from t = 0. Their steps, new meshes and contact lines are those of every run. The scene has a
+bonding strength that no wall reaches, as a scene that asks for tractions has.
+"""
+from functools import cache
+
+import numpy as np
+import pytest
+
+from reference import gold_growth
+from repro.fem.walls import TOP
+from repro.march.state import Report
+from repro.model import adhesion
+from repro.scene import Scene
+from verification.evidence.cases import parametrize
+from verification.evidence.checks import at_most
+from verification.problems import runs
+from verification.problems.schemes import load_scene
+
+#: Largest relative errors that presets aim at, by number. They were written before the errors were seen.
+AIMS = {"length": {"fast": 4e-3, "accurate": 1.5e-3, "exact": 5e-4}, "tip": dict.fromkeys(runs.QUADRATIC, 2e-4),
+        "wall_traction": {"fast": 5e-2, "accurate": 2e-2, "exact": 1e-2},
+        "tensile_stress": {"fast": 5e-2, "accurate": 2e-2, "exact": 1e-2}}
+#: The largest bar of a reference that judges, over the aim.
+SHARE = 0.25
+#: Largest errors that are accepted where an aim is missed, by kind of states, number and preset; measured errors of
+#: `fast`, `accurate` and `exact` on 2026-11-29 in comments. Runs with other last bits have other meshes, so the limits
+#: are about one and a half times as large. No limit says that a preset is good: the aims say that.
+#: The first state is just after contact, when the length of contact is 7.6 um.
+#: On a bonded wall, elements at its edge are longer than the mean of the traction, W / 20 = 2.5 um: 10
+#: um in `fast`, 4.4 in `accurate`, 2.9 in `exact` for R = 20 um. For R = 5 um they are shorter, and tractions err by 2 %
+#: or less. Stresses of shapes that are not in equilibrium, as before 2026-11-29, exceed these limits.
+ACCEPTED: dict[str, dict[str, dict[str, float]]] = {
+    "touching": {
+        "length": {"fast": 0.035, "accurate": 0.0145, "exact": 0.0025},  # 2.4, 0.94, 0.16 %
+        "tip": {"fast": 6e-4},  # 0.039 %; accurate has 0.013, exact 0.005
+        "wall_traction": {"fast": 1.45, "accurate": 0.2, "exact": 0.22},  # 95, 13, 14 %
+        "tensile_stress": {"fast": 0.42, "accurate": 0.045}},  # 28, 3.0 %; exact has 0.18
+    "bonded": {
+        "tip": {"fast": 3e-3, "accurate": 2e-3, "exact": 1.1e-3},  # 0.19, 0.14, 0.071 %
+        "wall_traction": {"fast": 0.75, "accurate": 0.8, "exact": 0.5},  # 51, 55, 33 %, with R = 45 um
+        "tensile_stress": {"fast": 0.23, "accurate": 0.11, "exact": 0.036}}}  # 15, 7.2, 2.4 %
+CAUSE = {"touching": "elements and new meshes at the lines", "bonded": "elements at the edges of the wall"}
+#: (number, theta, preset) that the reference cannot judge: near the edge of a bonded wall its surface turns over.
+NOT_JUDGED = {("wall_traction", 1.15, "exact")}
+WIDTH = 50.0
+#: The lower wall, by kind of states.
+WALL = {"touching": "sliding", "bonded": "bonded"}
+PRESETS = {preset: (preset,) for preset in runs.QUADRATIC}
+NAMES = {"length": "length of contact", "tip": "tips", "wall_traction": "traction of the walls",
+         "tensile_stress": "tensile stress"}
+
+
+@cache
+def errors(kind: str, preset: str) -> dict[tuple[str, float, float], float]:
+    """Relative errors of a preset by number, radius (um) and theta; of both tips the larger one."""
+    by_radius = {}
+    for state in gold_growth.states(kind):
+        by_radius.setdefault(state.radius, []).append(state)
+    found = {}
+    for radius, states in by_radius.items():
+        scene, reports = grown(kind, preset, radius, [state.theta for state in states])
+        for state, report in zip(states, reports):
+            for name, computed in numbers(scene, report).items():
+                if name in state.numbers:
+                    expected = state.numbers[name].value
+                    found[name, radius, state.theta] = float(np.abs(np.array(computed) / expected - 1).max())
+    return found
+
+
+def grown(kind: str, preset: str, radius: float, thetas: list[float], *changes: str) -> tuple[Scene, list[Report]]:
+    """A scene with a half-disc (radius in um), and its reports after uniform growth to each theta."""
+    changes = (runs.with_preset(preset), f'pore.width="{WIDTH} um"', f'aggregate.radius="{radius} um"',
+               f'growth.wall="{WALL[kind]}"', 'kinetics.decay_coefficient="0 1/d"',
+               'growth.bonding_strength="1e6 MPa"', *changes)
+    scene = load_scene("base", changes)
+    rate, _ = runs.growth_rates(scene.kinetics, scene.substrates)
+    hours = [f"{time} h" for time in np.log(thetas) / rate]
+    scene = runs.supplied_everywhere(
+        load_scene("base", (*changes, f'growth.end="{hours[-1]}"', f"output.times={hours}")))
+    return scene, runs.reports_of(scene)
+
+
+def numbers(scene: Scene, report: Report) -> dict[str, float | tuple[float, float]]:
+    """The numbers of :mod:`reference.gold_growth`, and both tips."""
+    outline, modulus = report.pore.boundary, scene.growth.shear_modulus
+    loading = adhesion.Loading.of(scene)
+    return {"length": runs.contact_length(outline, TOP), "tip": (outline.downstream, -outline.upstream),
+            "wall_traction": adhesion.wall_peak(loading, report.pore, report.solved).value / modulus,
+            "tensile_stress": adhesion.tensile_peak(loading, report.pore, report.solved).value / modulus}
+
+
+def judge(kind: str, preset: str, record) -> None:
+    """Record the errors of a preset."""
+    for state in gold_growth.states(kind):
+        for name, expected in state.numbers.items():
+            if name not in AIMS or (name, state.theta, preset) in NOT_JUDGED:
+                continue
+            aim, bar = AIMS[name][preset], expected.bar / expected.value
+            assert bar <= SHARE * aim, f"{name} at {state}: the reference is known to {bar:.1e} only"
+            limit = ACCEPTED[kind].get(name, {}).get(preset, aim)
+            origin = "the aim of the preset" if limit == aim else f"the aim of {100 * aim:g} % is missed: {CAUSE[kind]}"
+            error = errors(kind, preset)[name, state.radius, state.theta]
+            record(at_most(f"{NAMES[name]}, {state.radius:g} um, theta {state.theta:g}", error, limit + bar,
+                           f"{origin}, and the reference's bar"))
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "growth-gold-contact", kind="cross-code", references=("gold_growth",), mutants=("half-angle", "tensile-stress-of-the-carried-shape"),
+    omitted="1, paper: nodes join the wall one by one, see growth-contact-lines")
+@parametrize("preset", PRESETS)
+def test_contact(preset, record):
+    """A half-disc that grows evenly into the opposite wall, as a run, has the length of contact, the tips and the
+    stresses that NGSolve has.
+
+    Norm: relative errors in four states, from a short length of contact to one that is longer than the pore is wide.
+    """
+    judge("touching", preset, record)
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "growth-gold-bonded", kind="cross-code", references=("gold_growth",),
+    mutants=("bonded-slides", "traction-at-a-point", "tensile-stress-of-triangles"),
+    omitted="1, paper: see coupling-adhesion-balance")
+@parametrize("preset", PRESETS)
+def test_bonded(preset, record):
+    """A half-disc that grows evenly on a wall to which it is bonded has the tips and the stresses that NGSolve has,
+    whatever its radius.
+
+    Norm: relative errors for radii from 0.1 to 0.9 of the pore's width.
+    """
+    judge("bonded", preset, record)
