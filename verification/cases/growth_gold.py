@@ -28,10 +28,10 @@ SHARE = 0.25
 #: Largest errors that are accepted where an aim is missed, by kind of states, number and preset; measured errors of
 #: `fast`, `accurate` and `exact` on 2026-11-29 in comments. Runs with other last bits have other meshes, so the limits
 #: are about one and a half times as large. No limit says that a preset is good: the aims say that.
-#: The first state is just after contact, when the length of contact is 7.6 um.
-#: On a bonded wall, elements at its edge are longer than the mean of the traction, W / 20 = 2.5 um: 10
-#: um in `fast`, 4.4 in `accurate`, 2.9 in `exact` for R = 20 um. For R = 5 um they are shorter, and tractions err by 2 %
-#: or less. Stresses of shapes that are not in equilibrium, as before 2026-11-29, exceed these limits.
+#: The first state is just after contact, when the length of contact is 7.6 um. On a bonded wall, elements at its edge
+#: are longer than the mean of the traction, W / 20 = 2.5 um: 10 um in `fast`, 4.4 in `accurate`, 2.9 in `exact` for R =
+#: 20 um. For R = 5 um they are shorter, and tractions err by 2 % or less. Stresses of shapes that are not in
+#: equilibrium, as before 2026-11-29, exceed these limits.
 ACCEPTED: dict[str, dict[str, dict[str, float]]] = {
     "touching": {
         "length": {"fast": 0.035, "accurate": 0.0145, "exact": 0.0025},  # 2.4, 0.94, 0.16 %
@@ -109,7 +109,8 @@ def judge(kind: str, preset: str, record) -> None:
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "growth-gold-contact", kind="cross-code", references=("gold_growth",), mutants=("half-angle", "tensile-stress-of-the-carried-shape"),
+    "growth-gold-contact", kind="cross-code", references=("gold_growth",),
+    mutants=("half-angle", "tensile-stress-of-the-carried-shape"),
     omitted="1, paper: nodes join the wall one by one, see growth-contact-lines")
 @parametrize("preset", PRESETS)
 def test_contact(preset, record):
