@@ -39,7 +39,7 @@ Sections of the paper and their modules, which name the equations that they solv
     3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division
     2.1, 2.3.3  walls                       repro.fem.walls
     3.5  transfer to a new mesh             repro.fem.transfer
-    2.1, 3.2  flow             (1)-(6)      repro.model.flow, .resistance, .brinkman
+    2.1, 3.2  flow             (1)-(6)      repro.model.flow, .interface, .resistance, .brinkman
     2.2  kinetics              (7)-(10)     repro.model.uptake_law, .kinetics
     2.2  substrates            (7)-(13)     repro.model.transport, .substrates
     2.2, 3.3  in time          (7)-(13)     repro.model.transport_in_time, .gear

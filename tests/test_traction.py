@@ -70,8 +70,9 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, ord
 
 
 def test_nodes_stay_on_a_wall_that_they_join_in_every_other_round(monkeypatch):
-    """The forces lift the aggregate while one node at most is on the wall. Two more nodes then join, and the forces
-    vanish. Shape and forces agree once nodes do not leave the wall any more."""
+    """The forces lift the aggregate while one node at most is on the wall. Two more nodes then join, the forces vanish,
+    and the two leave. After four rounds the node on the wall stays there. The lifted neighbours are then not thinner
+    than their wedge may be, so that shape and forces agree."""
     scene = load_scene("wide", ["numerics.preset=fast", exchange(elements="linear"), "pore.width=25 um",
                                 "aggregate.radius=23 um", "numerics.contact_elements=0",
                                 "growth.fluid_forces=included"])

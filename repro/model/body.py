@@ -27,8 +27,8 @@ class Body:
     its triangles; solid: the aggregate as it was at t = 0; configuration: from which strain counts;
     line_speeds: (2, 2) um/h, speeds of the contact lines, None if unknown. A row has the lines of
     one wall, the lower wall first: the line where a free surface begins along the loop, then the
-    line where one ends. origin_known: False if ``solid`` is no longer the aggregate of t = 0:
-    without strain since then, a new mesh replaces places at t = 0 that fold by the present ones.
+    line where one ends. origin_known: False once present places have replaced places at t = 0
+    that fold. This happens only if strain does not count from t = 0.
     """
 
     wall: np.ndarray

@@ -26,8 +26,8 @@ from repro.model.pore import Pore
 
 #: By the geometry of the triangles.
 CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
-#: Rounds of shape and fluid forces after which contact lines stay in place, because each new
-#: search may move them by up to its tolerance, or by an edge, and nodes on a wall stay there.
+#: Contact lines stay in place after so many rounds of shape and fluid forces, because each search
+#: moves them by up to its tolerance or an edge. Nodes on a wall then stay there, too.
 SETTLING_ROUNDS = 4
 #: Shape and flow agree if the last round moves no node by more than this, over the aggregate's
 #: thickness.

@@ -22,8 +22,8 @@ MOST_GRADED = 4.0
 class Grading:
     """How a pore is solved, and how it gets finer elements at its aggregate.
 
-    seeding: makes the pore anew at t = 0; remeshing: at later times, None without growth, whose
-    times they are.
+    seeding: makes the pore again at t = 0; remeshing: gives it another mesh at later times, None
+    without growth, which has no later times.
     """
 
     solver: Solver

@@ -69,4 +69,4 @@ TRACTION = Traction()
 
 def interface_of(word: str) -> Interface:
     """The form of a value of ``numerics.interface``."""
-    return TRACTION if word == "traction" else LAPLACIAN
+    return {"laplacian": LAPLACIAN, "traction": TRACTION}[word]

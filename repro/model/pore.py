@@ -131,8 +131,10 @@ class Pore:
         """Its place in the lists. Raises MissingError in a clean channel."""
         if self.focus is not None:
             return self.focus
-        number, = range(len(self.bodies)) or (needed(None, "an aggregate"),)
-        return number
+        if len(self.bodies) > 1:
+            raise ValueError(f"the pore has {len(self.bodies)} aggregates; focused(number) sees "
+                             "one of them")
+        return 0 if self.bodies else needed(None, "an aggregate")
 
     @property
     def body(self) -> Body:

@@ -125,7 +125,7 @@ class Quantity:
         return in_unit(value, self.unit, unit) if unit else f"{float(value)!r} {self.unit}"
 
     def stated(self, value: float, unit: str) -> Stated:
-        """Write a value in the internal unit as a text in another one, with its parts."""
+        """Text, number and unit of a value; `value` is in the internal unit, the text in `unit`."""
         text = self.write(value, unit)
         return Stated(text, float(_parts(text)[0]), unit)
 
