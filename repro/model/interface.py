@@ -69,4 +69,5 @@ TRACTION = Traction()
 
 def interface_of(word: str) -> Interface:
     """The form of a value of ``numerics.interface``."""
-    return {"laplacian": LAPLACIAN, "traction": TRACTION}[word]
+    forms: dict[str, Interface] = {"laplacian": LAPLACIAN, "traction": TRACTION}
+    return forms[word]
