@@ -301,16 +301,16 @@ def _defects(*changes: str) -> tuple[float, float]:
     """Relative residual of the equilibrium under the flow around its own shape, and around the previous shape."""
     scene = _in_denser_water(FACTORS[-1], *changes)
     seed, grown, theta = _moved(FACTORS[-1], *changes)
-    nodes, body = seed.mesh.body, seed.body
+    nodes, solid = seed.mesh.body, seed.body.solid
     constrained_dofs = mechanics.constrained(len(nodes), seed.region.own_loop, seed.body.wall, seed.body.fixed)
     defects = []
-    stabilisation = growth.STABILISATIONS[body.shape.geometry].on(body, seed.mesh.points[nodes])
+    stabilisation = growth.STABILISATIONS[solid.shape.geometry].on(solid, seed.mesh.points[nodes])
     place, pressure = grown.mesh.points[nodes], grown.pressure[seed.mesh.topology.body_corners]
     for pore_of_flow in (grown, seed):
         fluid = traction.Fluid.of(scene)
         forces = traction.forces(fluid, traction.surroundings(fluid.meshing, seed, pore_of_flow), pore_of_flow)
-        supports = supports_of(body, grown, forces)
-        system = growth.System(body, constrained_dofs, stabilisation=stabilisation, forces=forces, supports=supports)
+        supports = supports_of(solid, grown, forces)
+        system = growth.System(solid, constrained_dofs, stabilisation=stabilisation, forces=forces, supports=supports)
         defects.append(system.under(theta, place, place, pressure).defect)
     return tuple(defects)
 
