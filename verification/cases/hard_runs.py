@@ -101,7 +101,7 @@ def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     """(mesh, head loss) around a half-disc of 20 um with noise on its nodes."""
     numerics = scene.numerics
     shape = half_disc(20.0, sizing.ACROSS_AGGREGATE * numerics.refinement, numerics.scheme.order)
-    free = shape.body.wall == FREE
+    free = shape.wall == FREE
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
     grid, _ = Meshing.of(scene).generate(replace(shape, points=points))
