@@ -139,7 +139,7 @@ def test_a_transfer_keeps_the_masses_of_each_aggregate(order):
     assert contiguous(restarted).mass == restarted.mass
 
 
-@pytest.mark.parametrize("forces", ["neglected", "included"])
+@pytest.mark.parametrize("forces", [pytest.param("neglected", marks=pytest.mark.thorough), "included"])
 @EVERY
 def test_two_aggregates_grow_in_one_pore_and_balances_close(order, forces):
     """Steps with flow, substrates and new meshes. The loop refuses a step whose balances do not close. The
