@@ -105,8 +105,8 @@ def test_the_numbers_of_base_are_those_of_table_1():
 
 
 def test_half_a_pore_has_the_numbers_of_the_whole_one():
-    """A seed and its mirror image beyond a plane of symmetry, beside the same seed in a pore of twice the width. The
-    whole pore of this pair has one aggregate, so a Damkoehler number is half as large."""
+    """A pore with a plane of symmetry has the numbers of a pore of twice the width with the same seed. Only the
+    Damkoehler number is twice as large, because the mirror image takes up as much."""
     scenes = [load_scene("base", ["flow.mean_velocity=3 m/day", f"pore.width={width} um", f"pore.upper_wall={wall}"],
                          unset=["flow.head"]) for width, wall in ((25, "symmetry"), (50, "no slip"))]
     half, whole = ({number.name: number for number in numbers.numbers(each, each.flow.mean_velocity)}

@@ -116,17 +116,35 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Topology:
-    """Connections of a mesh.
+class Connections:
+    """Triangles by their nodes.
 
-    cells: (T, 3 or 6) nodes, corners counterclockwise, then middles; corners: number of
-    corners; region: (T,) number of each triangle's aggregate, from one, zero in the fluid; loops:
-    (M,) nodes of the boundary of each aggregate, as in :class:`Region`; inlet, outlet: corners from
-    the lower wall up; walls: corners of both walls; method: of the linear systems.
+    cells: (T, 3 or 6) nodes, corners counterclockwise, then middles; corners: number of corners.
     """
 
     cells: np.ndarray
     corners: int
+
+    @property
+    def geometry(self) -> int:
+        """1: straight triangles with linear functions, 2: curved ones with quadratic functions."""
+        return elements.order_of(self.cells)
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """(T, 3) corners."""
+        return self.cells[:, :3]
+
+
+@dataclass(frozen=True, eq=False)
+class Topology(Connections):
+    """Connections of a mesh.
+
+    region: (T,) number of each triangle's aggregate, from one, zero in the fluid; loops:
+    (M,) nodes of the boundary of each aggregate, as in :class:`Region`; inlet, outlet: corners from
+    the lower wall up; walls: corners of both walls; method: of the linear systems.
+    """
+
     region: np.ndarray
     loops: tuple[np.ndarray, ...]
     inlet: np.ndarray
@@ -134,16 +152,6 @@ class Topology:
     walls: np.ndarray
     method: Method = DEFAULT
     _systems: dict[Hashable, ElementSystem] = field(init=False, repr=False, default_factory=dict)
-
-    @property
-    def geometry(self) -> int:
-        """1: straight triangles, 2: curved ones."""
-        return elements.order_of(self.cells)
-
-    @property
-    def triangles(self) -> np.ndarray:
-        """(T, 3) corners."""
-        return self.cells[:, :3]
 
     @cached_property
     def straight(self) -> Topology:
@@ -435,6 +443,10 @@ class Mesh:
         nodal = np.zeros((len(self.points), values.shape[1]))
         nodal[region.nodes] = values
         return nodal
+
+    def of_region(self, region: Region, values: np.ndarray) -> np.ndarray:
+        """(n, k) values at the nodes of one aggregate, from those at the nodes of all."""
+        return values[np.searchsorted(self.body, region.nodes)]
 
     def by_triangle(self, values: Sequence[np.ndarray]) -> np.ndarray:
         """(T, ...) values in the triangles of biomass, in their order, from those (t, ...) of each

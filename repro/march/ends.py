@@ -150,11 +150,10 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
     for side in ("upstream", "downstream"):
         end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
         yield Event(1 - elements_to_end(ends.channel, pore, side), end)
-    biot = max((body.solid.energy.biot or 0.0 for body in pore.bodies), default=0.0)
-    if pore.accumulates and biot > 0:
+    if pore.accumulates and pore.biot > 0:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
-        yield Event(biot / compression.stretch - 1, fold)
+        yield Event(pore.biot / compression.stretch - 1, fold)
     if ends.bonding is not None:
         peak = adhesion.wall_peak(ends.loading, pore, solved)
         yield _detachment(ends.bonding, pore, peak, "detaches", "its wall must bear")

@@ -63,8 +63,7 @@ def refuse_fold(expanded: Pore) -> None:
     It applies where strain counts from the last shape: a shorter step compresses the surface less.
     """
     compression = most_compressed(Compression(), expanded)
-    biot = max((body.solid.energy.biot or 0.0 for body in expanded.bodies), default=0.0)
-    if not expanded.accumulates and compression.stretch < biot:
+    if not expanded.accumulates and compression.stretch < expanded.biot:
         raise GrowthError(f"growth in one step compresses the surface to {compression.stretch:.3f} "
                           f"of its length near x = {compression.x:.4g}, y = {compression.y:.4g} um")
 

@@ -12,8 +12,8 @@ with the means of the pull, from the aggregate into the wall, and of the shear o
 20 around x. The stress at a contact line may be singular. A mean over a length converges as the
 mesh is refined. The tensile stress is a weighted mean over the points within W / 20 of a node.
 
-A shape that was carried to a new mesh is in equilibrium on the old one. Its stresses at contact
-lines err by up to a factor of two on the new mesh. So both stresses are those of the equilibrium on
+A new mesh takes over a shape that was in equilibrium on the old mesh. Its stresses at contact lines
+then err by up to 185 % (``growth-gold-contact``). So both stresses are those of the equilibrium on
 the present mesh, with the same contact surfaces and the present forces of the water.
 
 Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
@@ -139,7 +139,7 @@ def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
 def fluid_load(loading: Loading, pore: Pore, solved: Solved) -> Load:
     """The force and the moment of the water on the aggregate from which the pore is seen."""
     nodes = pore.region.nodes
-    forces = fluid_forces(loading, pore, solved)[np.searchsorted(pore.mesh.body, nodes)]
+    forces = pore.mesh.of_region(pore.region, fluid_forces(loading, pore, solved))
     outline = pore.boundary
     seeded, *_ = pore.mesh.walls
     on = outline.points[outline.wall == seeded.number, 0]
@@ -177,7 +177,7 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> Pore:
     rest = pore
     for number, region in enumerate(pore.mesh.regions):
         seen = rest.focused(number)
-        own = None if forces is None else forces[np.searchsorted(pore.mesh.body, region.nodes)]
+        own = None if forces is None else pore.mesh.of_region(region, forces)
         rest, _ = equilibrium(mechanics, seen, seen, own)
     return rest.focused(pore.focus)
 

@@ -160,7 +160,7 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
               for body, expansion, region in zip(grown.bodies, theta, mesh.regions, strict=True)]
     shape = Expansion(replace(grown, bodies=tuple(bodies)), 0, np.inf)
     for number, region in enumerate(mesh.regions):
-        own = None if forces is None else forces[np.searchsorted(mesh.body, region.nodes)]
+        own = None if forces is None else mesh.of_region(region, forces)
         closing = CLOSINGS[mesh.geometry](mechanics, shape.pore.focused(number),
                                           start.focused(number), own, search)
         closed = closing.close()

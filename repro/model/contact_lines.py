@@ -7,10 +7,11 @@ beyond a line is the smallest value on the free surface of
     gap / min(film, tan(angle) d) - 1
 
 at the distance d from the line along the wall. If it is negative, a film or a wedge is too thin.
-Beside the line the surface opens like the root of d, and discretely at an angle that depends on its
-arcs. So the angle is tested at distances of ANGLE_FROM film / tan(angle) or more, where a converged
-surface comes nearest to the wall. Closer to the line a part of it suffices, PART_OF_ANGLE
-tan(angle), so that no arc passes the wall.
+Beside the line the surface opens like the root of d, and the angle of the first arc depends on the
+arc's length. The angle is therefore tested at distances of ANGLE_FROM film / tan(angle) or more. A
+converged surface comes nearest to the wall there. Closer to the line PART_OF_ANGLE tan(angle)
+suffices, so that no arc passes the wall.
+
 The contact surface is the smallest one without a negative clearance, so each line advances until
 its clearance vanishes. The secant method, safeguarded by bisection, searches for all lines at once.
 Each trial is an equilibrium of the aggregate.
@@ -69,7 +70,7 @@ class SearchOptions:
     """How contact lines are searched for.
 
     landing: the search ends if the film at the first contact is thinner than this fraction of the
-    least film; stationary: do lines stay at their first trial, and nodes on the walls of the start;
+    least film; stationary: do lines stay at their first trial, and nodes on the start's walls;
     patient: is a failed equilibrium tried again in smaller parts; advances: {(number, wall,
     direction): um} of the first trial, along the outline of an aggregate, by its place in the list.
     """

@@ -67,10 +67,7 @@ class Expansion:
     @property
     def position(self) -> np.ndarray:
         """(N, 2) um, new positions of the grown pore's nodes."""
-        return self.on_grown(self.pore.mesh.points)
-
-    def on_grown(self, points: np.ndarray) -> np.ndarray:
-        """(N, 2) um at the nodes of the grown pore, from places of all nodes."""
+        points = self.pore.mesh.points
         for division in self.divisions[::-1]:
             points = division.restricted(points)
         return points

@@ -53,6 +53,11 @@ def walls_of(scene: Scene) -> Walls:
     return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
 
 
+def whole_width_of(scene: Scene) -> float:
+    """W of a scene's pore (um), with the mirror image beyond a plane of symmetry."""
+    return whole_width(walls_of(scene))
+
+
 def film(scene: Scene) -> float:
     """Thickness (um) at which a film closes, and the least that the mesh resolves."""
     return scene.growth.minimum_film if scene.growth else MINIMUM_FILM

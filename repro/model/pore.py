@@ -75,6 +75,11 @@ class Pore:
         """Does strain add up over the steps? Only then do folds and stresses have a meaning."""
         return all(body.configuration.accumulates for body in self.bodies)
 
+    @property
+    def biot(self) -> float:
+        """Largest limit of Biot of the aggregates' energies; zero if none has a limit."""
+        return max((body.solid.energy.biot or 0.0 for body in self.bodies), default=0.0)
+
     @cached_property
     def outlines(self) -> tuple[Outline, ...]:
         """Boundaries of the aggregates."""

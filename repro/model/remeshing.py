@@ -202,8 +202,7 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
     for number, body in enumerate(target.bodies):
         def carry(positions: np.ndarray, before: Region = expanded.mesh.regions[number],
                   after: Region = target.mesh.regions[number]) -> np.ndarray:
-            nodal = np.zeros_like(old.points)
-            nodal[before.nodes] = positions
+            nodal = old.from_region(before, positions)
             carried = target.mesh.from_body(at.field(nodal, old.cells[old.biomass]))
             return carried[after.nodes]
         configuration = expanded.bodies[number].configuration.carried(carry)

@@ -16,31 +16,19 @@ from repro.fem.brief import brief
 from repro.fem.elements import Table
 from repro.fem.forms import Basis, basis
 from repro.fem.linear import DEFAULT, Method
-from repro.fem.mesh import Region
+from repro.fem.mesh import Connections, Region
 from repro.fem.space import Space
 from repro.model.energies import NEO_HOOKEAN, Energy
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
-    """Connections of the aggregate's own mesh. cells: (t, 3 or 6), corners numbered first; corners:
-    their number; degree: of the quadrature; method: of the linear systems."""
+class Shape(Connections):
+    """Connections of the aggregate's own mesh, corners numbered first. degree: of the quadrature;
+    method: of the linear systems."""
 
-    cells: np.ndarray
-    corners: int
     degree: int
     method: Method = DEFAULT
     _constrained: dict[str, ElementSystem] = field(init=False, repr=False, default_factory=dict)
-
-    @property
-    def geometry(self) -> int:
-        """1: straight triangles, linear displacements; 2: curved ones, quadratic displacements."""
-        return elements.order_of(self.cells)
-
-    @property
-    def triangles(self) -> np.ndarray:
-        """(t, 3) corners."""
-        return self.cells[:, :3]
 
     @property
     def table(self) -> Table:

@@ -14,7 +14,7 @@ from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh, Remeshing
 from repro.model.solving import Solved, Solver
 from repro.model.transport_in_time import TransportInTime
-from repro.scene import Growth, Scene, TimeTables
+from repro.scene import Growth, Scene, TimeTables, needed
 from repro.scene import Pore as Channel
 
 
@@ -24,7 +24,7 @@ class Stages:
 
     growth: section [growth] of the scene; tables: times at which steps end, and jumps; tolerance:
     of a step; grading: flow and substrates, on a mesh that resolves them; mechanics: shape of the
-    grown aggregate; remeshing: mesh after a step.
+    grown aggregate.
     """
 
     growth: Growth
@@ -32,19 +32,23 @@ class Stages:
     tolerance: float
     grading: Grading
     mechanics: Mechanics
-    remeshing: Remeshing
 
     @classmethod
     def of(cls, scene: Scene) -> Stages:
         """The stages of a scene with growth."""
         _, _, growth = scene.growing
         return cls(growth, scene.time_tables, scene.numerics.tolerance, Grading.of(scene),
-                   Mechanics.of(scene), Remeshing.of(scene))
+                   Mechanics.of(scene))
 
     @property
     def solver(self) -> Solver:
         """Of flow and substrates on the mesh of a pore."""
         return self.grading.solver
+
+    @property
+    def remeshing(self) -> Remeshing:
+        """The mesh after a step."""
+        return needed(self.grading.remeshing, "[growth]")
 
     @property
     def transport(self) -> TransportInTime:

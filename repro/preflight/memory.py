@@ -26,9 +26,14 @@ from repro.errors import MeshError
 from repro.fem import sizing
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
-from repro.fem.walls import whole_width
 from repro.model.advice import with_advice
-from repro.model.meshing import initial_outline, resolution, sized, thin_layers, walls_of
+from repro.model.meshing import (
+    initial_outline,
+    resolution,
+    sized,
+    thin_layers,
+    whole_width_of,
+)
 from repro.scene import Scene, SceneError, needed
 
 #: Bytes per node at the peak of a run, measured at 800 to 50 000 nodes.
@@ -59,7 +64,7 @@ def expected_nodes(scene: Scene) -> float:
 def first_nodes(scene: Scene) -> float:
     """Estimated nodes of the mesh at t = 0: around a half-disc or an outline, or of a channel."""
     if scene.aggregate is None:
-        return _nodes(scene, 0.0, 3 * whole_width(walls_of(scene)), [])
+        return _nodes(scene, 0.0, 3 * whole_width_of(scene), [])
     radius = scene.aggregate.radius
     if radius is not None:
         return _half_disc_nodes(scene, radius, radius)
@@ -94,7 +99,7 @@ def _nodes(scene: Scene, thickness: float, extent: float,
     """
     pore = scene.pore
     numerics = scene.numerics
-    margin = min(10 * thickness, 1.5 * whole_width(walls_of(scene)))
+    margin = min(10 * thickness, 1.5 * whole_width_of(scene))
     length = pore.length if numerics.whole_pore else min(pore.length, extent + 2 * margin)
     largest = pore.width / ACROSS_PORE / resolution(scene)
     if numerics.gradation == 0:

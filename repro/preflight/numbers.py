@@ -12,10 +12,9 @@ from dataclasses import dataclass
 
 from repro.fem.outline import Outline
 from repro.fem.sizing import meshed_extent
-from repro.fem.walls import whole_width
 from repro.model.flow import MPA_PER_UM
 from repro.model.kinetics import rate_law
-from repro.model.meshing import initial_outline, least_gap, sized, walls_of
+from repro.model.meshing import initial_outline, least_gap, sized, whole_width_of
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
 from repro.model.uptake_law import UptakeLaw
@@ -127,7 +126,7 @@ def numbers(scene: Scene, speed: float | None, end: Sizes | None = None) -> list
     """
     computed: list[Number] = []
     if speed is not None:
-        reynolds = speed * _whole_width(scene) / scene.flow.kinematic_viscosity
+        reynolds = speed * whole_width_of(scene) / scene.flow.kinematic_viscosity
         computed.append(Number("Reynolds", reynolds, None, "u W / nu"))
     if speed is not None and scene.substrates:
         computed += _transported(scene, speed)
@@ -136,11 +135,6 @@ def numbers(scene: Scene, speed: float | None, end: Sizes | None = None) -> list
     if scene.growth:
         computed += _grown(scene, speed, end)
     return computed
-
-
-def _whole_width(scene: Scene) -> float:
-    """W (um), with the mirror image beyond a plane of symmetry."""
-    return whole_width(walls_of(scene))
 
 
 def evaluate_at_largest(scene: Scene, velocity: float | None,
@@ -161,7 +155,7 @@ def evaluate_at_largest(scene: Scene, velocity: float | None,
 
 def _transported(scene: Scene, speed: float) -> Iterator[Number]:
     for name, substrate in scene.substrates.modelled.items():
-        value = speed * _whole_width(scene) / substrate.diffusivity
+        value = speed * whole_width_of(scene) / substrate.diffusivity
         yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
     yield Number("cell Peclet", 1.5 * speed * sized(scene).largest / slowest(scene), None,
                  "1.5 u h / D, h of the largest elements, the smallest D")
@@ -191,7 +185,7 @@ def _taken_up(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[
 
 
 def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Number]:
-    across = half_length(scene) if speed is None else _whole_width(scene)
+    across = half_length(scene) if speed is None else whole_width_of(scene)
     length = "l half of the meshed part" if speed is None else "l = W"
     yield Number("transport over growth time",
                  fastest_growth(scene) * across**2 / slowest(scene), None,
@@ -209,7 +203,7 @@ def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Num
 def half_length(scene: Scene) -> float:
     """Half of the length (um) that is meshed at t = 0."""
     seed = initial_outline(scene)
-    first, last = meshed_extent(seed, _whole_width(scene), scene.pore.length,
+    first, last = meshed_extent(seed, whole_width_of(scene), scene.pore.length,
                                 scene.numerics.whole_pore)
     return (last - first) / 2
 
@@ -223,7 +217,7 @@ def stresses(scene: Scene, speed: float, end: Sizes | None) -> tuple[float, floa
     """
     drive = scene.flow
     width = scene.pore.width
-    whole = _whole_width(scene)
+    whole = whole_width_of(scene)
     modulus = scene.growth.shear_modulus
     viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / modulus
     shear = 6 * viscosity * speed / whole

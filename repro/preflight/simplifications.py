@@ -8,11 +8,17 @@ from dataclasses import dataclass
 from itertools import chain
 
 from repro.fem import sizing
-from repro.fem.walls import whole_width
 from repro.march.step_control import SHORTEST
 from repro.model.brinkman import ACROSS
 from repro.model.kinetics import THINNEST
-from repro.model.meshing import MOST_REFINED, film, least_gap, resolution, walls_of
+from repro.model.meshing import (
+    MOST_REFINED,
+    film,
+    least_gap,
+    resolution,
+    walls_of,
+    whole_width_of,
+)
 from repro.model.pore import Pore
 from repro.model.surface import surface
 from repro.model.transport_in_time import transport_in_time
@@ -270,7 +276,7 @@ def _ends(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     if not (scene.flow or scene.substrates):
         return
     for reached in (numbers.at_start(scene), sizes):
-        free = min(10 * reached.thickness, 1.5 * whole_width(walls_of(scene)))
+        free = min(10 * reached.thickness, 1.5 * whole_width_of(scene))
         if reached.reach + free > scene.pore.length / 2:
             when = f"at t = {reached.time:.3g} h" if reached.time else "from the start"
             stops = ", and the run ends if the aggregate reaches one of them"

@@ -44,7 +44,7 @@ def with_unit(name: str, symbol: str | None = None) -> str:
 def readable_unit(name: str, values: Iterable[np.ndarray]) -> tuple[str, float]:
     """Symbol of the unit in which a page shows values, and the factor from the unit of the name.
 
-    It is the largest unit in which the largest value is at least one, or else the smallest unit.
+    It is the largest unit in which some value reaches one, or the smallest unit if no value does.
     """
     largest = max((float(np.nanmax(np.abs(each))) for each in values if np.isfinite(each).any()),
                   default=0.0)

@@ -149,7 +149,7 @@ MUTANTS = (
         "repro/fem/mesh.py",
         ("stretch-of-first-edges",
          "the stretch along the surface uses the first edge of a triangle, even if another one lies on the surface",
-         "Topology.beside_loop",
+         "Region.beside_loop",
          "return owner, places[:, 0]",
          "return owner, 0 * places[:, 0]")),
     *changes(
@@ -178,6 +178,6 @@ MUTANTS = (
         ("fold-never",
          "no limit of the stretch ends a run",
          "_events",
-         "Event(biot / compression.stretch - 1, fold)",
+         "Event(pore.biot / compression.stretch - 1, fold)",
          "Event(-1.0, fold)")),
 )

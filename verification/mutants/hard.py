@@ -201,6 +201,6 @@ MUTANTS = (
         ("hard-fold-unfounded",
          "A run ends as a fold although its surface is hardly compressed.",
          "_events",
-         "Event(biot / compression.stretch - 1, fold)",
+         "Event(pore.biot / compression.stretch - 1, fold)",
          "Event(0.99 / compression.stretch - 1, fold)")),
 )
