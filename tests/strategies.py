@@ -141,7 +141,12 @@ def mirrored(outline):
         return np.roll(values[::-1], 1 - outline.geometry, axis=0)
 
     return Outline(back(outline.points) * [-1, 1], back(outline.wall), back(outline.fixed),
-                   back(outline.origin) * [-1, 1], outline.geometry)
+                   back(outline.origin) * [-1, 1], outline.geometry, _mirrored_seat(outline.seat))
+
+
+def _mirrored_seat(seat):
+    """The seat of an aggregate whose pore is mirrored in x -> -x."""
+    return replace(seat, middle=None if seat.middle is None else -seat.middle)
 
 
 def mirror_image(at, along):
@@ -169,7 +174,8 @@ def mirror_image(at, along):
                    active=exchanged(body.active), inert=exchanged(body.inert), theta=exchanged(body.theta),
                    solid=material(space, region, about + body.reference * sign, body.solid.energy),
                    configuration=body.configuration.carried(lambda positions: about + positions * sign),
-                   line_speeds=None)
+                   line_speeds=None,
+                   seat=_mirrored_seat(body.seat) if along else replace(body.seat, wall=walls[body.seat.wall]))
     return replace(at, space=space, bodies=(body,))
 
 

@@ -308,7 +308,7 @@ def test_a_step_grows_as_much_on_a_new_mesh_half_way():
     numerics = [replace(scene.numerics, refinement=part) for part in (0.3, 0.9)]
     same_mesh, new_mesh = (midpoint.solve_halfway(Stages.of(replace(scene, numerics=each)), pore, solved, first, 4.0,
                                                   PATIENT) for each in numerics)
-    assert new_mesh.produced == pytest.approx(same_mesh.produced, rel=1e-2)
+    assert new_mesh.produced[0] == pytest.approx(same_mesh.produced[0], rel=1e-2)
     assert len(new_mesh.solved.flow.velocity) > 2 * len(same_mesh.solved.flow.velocity)
 
 

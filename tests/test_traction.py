@@ -66,7 +66,7 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, ord
     search = contact_lines.SearchOptions(landing=LANDED)
     closed = contact.expand(Mechanics.of(scene), seed, [1.02 * seed.body.theta], search=search)
     assert closed.pore.contact
-    assert closed.gap < 1.99 < LANDED * scene.growth.minimum_film
+    assert closed.gaps[1] < 1.99 < LANDED * scene.growth.minimum_film
 
 
 def test_nodes_stay_on_a_wall_that_they_join_in_every_other_round(monkeypatch):

@@ -9,7 +9,7 @@ from repro.fem import mesher, sizing
 from repro.fem.outline import half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import FREE, channel_walls, whole_width
+from repro.fem.walls import BOTTOM, FREE, TOP, Seat, channel_walls, whole_width
 from repro.model import adhesion, contact, flow, meshing
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import Clearance, surface_ends
@@ -50,7 +50,7 @@ def test_a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh(order, on):
     assert seed.points[seed.fixed].tolist() == [[3.0, on.y]]
     assert seed.untouched(walls) == (other,) and seed.gap(walls) == pytest.approx(WIDTH - 20.0)
     assert seed.nearest(other)[1] == pytest.approx(3.0, abs=0.1)
-    sizes = Sizing(walls, 0.5, 2.0, seed=3.0)
+    sizes = Sizing(walls, 0.5, 2.0)
     points, _ = sizing.size_sources(seed, sizes)
     assert np.count_nonzero(other.holds(points)) == np.count_nonzero(seed.wall == FREE)
     mesh, split = mesher.generate(seed, sizing.meshed_extent(seed, WIDTH, 600.0), sizes, order)
@@ -88,7 +88,7 @@ def grown_plug(order, growth=1.05):
 @EVERY_ORDER
 def test_a_surface_keeps_its_place_on_a_bonded_wall_alone(order, number):
     mechanics, seed = grown_plug(order)
-    seed = with_wall(seed, number, bonded=True)
+    seed = with_wall(seed, number, bonded=True).with_body(seat=Seat(number))
     moved = contact.expand(mechanics, seed, [seed.body.theta]).position[seed.mesh.loop] - seed.boundary.points
     for wall in seed.mesh.walls:
         along = np.abs(moved[seed.body.wall == wall.number, 0]).max()
@@ -131,7 +131,7 @@ def test_a_film_closes_at_a_plane_of_symmetry_at_half_of_the_gap(order):
         seed = seeded(scene)
         shape = contact.expand(Mechanics.of(scene), seed, [seed.body.theta])
         closed[gap, upper] = shape.pore.contact
-        assert shape.gap == pytest.approx(gap if upper == "no slip" else 2 * gap, rel=1e-3)
+        assert shape.gaps[1] == pytest.approx(gap if upper == "no slip" else 2 * gap, rel=1e-3)
     assert closed == {(1.05, "no slip"): True, (1.05, "symmetry"): False, (0.95, "no slip"): True,
                       (0.95, "symmetry"): True}
 
@@ -200,6 +200,8 @@ def test_expected_numbers_are_those_of_the_pore_with_its_mirror_image(upper):
 
 
 @pytest.mark.parametrize("wall", ["sliding", "bonded"])
-def test_a_scene_bonds_the_wall_of_its_seed_alone(wall):
+def test_a_scene_bonds_each_aggregate_to_the_wall_of_its_seed_alone(wall):
     walls = meshing.walls_of(load_scene("base", [f"growth.wall={wall}"]))
-    assert [each.bonded for each in walls] == [wall == "bonded", False]
+    for number in (BOTTOM, TOP):
+        seen = Seat(number).walls(walls)
+        assert seen[0].number == number and [each.bonded for each in seen] == [wall == "bonded", False]

@@ -64,7 +64,8 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
     """
     outlines = list(outlines)
     for _ in range(HALVINGS):
-        outlines = [sizes_of.split(outline, sizing) for outline in outlines]
+        outlines = [sizes_of.split(outline, beside)
+                    for outline, beside in sizes_of.each_beside(outlines, sizing)]
         corners = [outline.corners for outline in outlines]
         for polygon in corners:
             check_outline(polygon, ends, sizing.walls)
@@ -96,8 +97,8 @@ class ElementSizes:
         """Sizes for outlines, or the largest everywhere without any."""
         sources = [np.empty((0, 2))]
         sizes = [np.empty(0)]
-        for outline in outlines:
-            near, size = sizes_of.size_sources(outline, sizing)
+        for outline, beside in sizes_of.each_beside(outlines, sizing):
+            near, size = sizes_of.size_sources(outline, beside)
             sources.append(near)
             sizes.append(size)
         return ElementSizes(np.concatenate(sources), np.concatenate(sizes), sizing)
@@ -167,16 +168,8 @@ def _boundaries(outlines: Sequence[Outline], ends: tuple[float, float],
         rim = element_sizes.path(*corners, corners[0])
         return rim, [(np.arange(len(rim)), 0)]
     store = _PointStore(np.concatenate([outline.points for outline in outlines]))
-    free = [wall for wall in walls if all(wall in outline.untouched(walls) for outline in outlines)]
-    touched = [wall for wall in walls if wall not in free]
-    own = _own_points(outlines)
-    if free:
-        fluid = _over_the_top(outlines, own, [*touched, *free], ends, element_sizes, store)
-    elif len(outlines) == 1:
-        fluid = _on_both_sides(outlines[0], touched, ends, element_sizes, store)
-    else:
-        raise MeshError("no mesh is generated around several aggregates that touch both walls")
-    bodies = [(points, number) for number, points in enumerate(own, 1)]
+    fluid = _Fluid(outlines, walls, ends, element_sizes, store).polygons()
+    bodies = [(points, number) for number, points in enumerate(_own_points(outlines), 1)]
     return store.points, [*fluid, *bodies]
 
 
@@ -187,45 +180,84 @@ def _around(walls: Sequence[Wall], ends: tuple[float, float]) -> np.ndarray:
     return np.array([(start, first.y), (end, first.y), (end, second.y), (start, second.y)])
 
 
-def _over_the_top(outlines: Sequence[Outline], own: Sequence[np.ndarray], walls: Sequence[Wall],
-                  ends: tuple[float, float], element_sizes: ElementSizes,
-                  store: _PointStore) -> list[Polygon]:
-    """The fluid around aggregates that touch only the first of two walls.
+class _Fluid:
+    """The fluid around aggregates: one polygon between any two that touch both walls."""
 
-    own: numbers of the points of each outline.
-    """
-    before, after, opposite_after, opposite_before = _around(walls, ends)
-    contacts = [_contact(outline, walls[0]) for outline in outlines]
-    along = np.argsort([walls[0].normal * outline.points[first, 0]
-                        for outline, (first, _) in zip(outlines, contacts)])
-    first, _ = contacts[along[0]]
-    start = store.add(element_sizes.path(before, outlines[along[0]].points[first]))
-    over = store.add(element_sizes.path(after, opposite_after, opposite_before, before))
-    rim = [start]
-    for number, following in zip(along, [*along[1:], None]):
-        outline = outlines[number]
-        first, last = contacts[number]
-        end = after if following is None else outlines[following].points[contacts[following][0]]
-        rim.append(own[number][_backwards(first, last, len(outline.points))])
-        rim.append(store.add(element_sizes.path(outline.points[last], end)[1:]))
-    return [(np.concatenate([*rim, over]), 0)]
+    def __init__(self, outlines: Sequence[Outline], walls: Walls, ends: tuple[float, float],
+                 element_sizes: ElementSizes, store: _PointStore):
+        self._outlines = outlines
+        self._own = _own_points(outlines)
+        # The polygons run along the wall of a seed first.
+        self._walls = outlines[0].seat.walls(walls)
+        self._corners = _around(self._walls, ends)
+        self._sizes = element_sizes
+        self._store = store
+        self._along = [self._order(wall) for wall in self._walls]
 
+    def _order(self, wall: Wall) -> list[int]:
+        """Aggregates that touch a wall, counterclockwise around the fluid."""
+        touching = [number for number, outline in enumerate(self._outlines)
+                    if (outline.wall == wall.number).any()]
+        return sorted(touching, key=lambda number: wall.normal * self._contact(number, wall)[0][0])
 
-def _on_both_sides(outline: Outline, walls: Sequence[Wall], ends: tuple[float, float],
-                   element_sizes: ElementSizes, store: _PointStore) -> list[Polygon]:
-    """The fluid before and after an aggregate that touches both walls, along the first one."""
-    before, after, opposite_after, opposite_before = _around(walls, ends)
-    first, last = _contact(outline, walls[0])
-    opposite_first, opposite_last = _contact(outline, walls[1])
-    points = outline.points
-    start = store.add(element_sizes.path(before, points[first]))
-    close = element_sizes.path(points[opposite_last], opposite_before, before)[1:]
-    close = store.add(close)
-    out = element_sizes.path(points[last], after, opposite_after, points[opposite_first])[1:]
-    out = store.add(out)
-    one_side = [start, _backwards(first, opposite_last, len(points)), close]
-    other_side = [_backwards(opposite_first, last, len(points)), out]
-    return [(np.concatenate(one_side), 0), (np.concatenate(other_side), 0)]
+    def polygons(self) -> list[Polygon]:
+        """Nodes of the polygons, along the first wall."""
+        first, opposite = self._along
+        spanning: list[int | None] = [number for number in first if number in opposite]
+        return [(self._between(before, after), 0)
+                for before, after in zip([None, *spanning], [*spanning, None])]
+
+    def _between(self, before: int | None, after: int | None) -> np.ndarray:
+        """The polygon between two aggregates that touch both walls, or an end of the mesh (None)
+        and one of them."""
+        first, opposite = self._walls
+        corners = self._corners
+        along = self._on_wall(0, before, after, corners[0], corners[1])
+        start = next(along)  # its new nodes have the first numbers, those beside it the last ones
+        around = [self._side(after, first, opposite, corners[1], corners[2]),
+                  *self._on_wall(1, after, before, corners[2], corners[3]),
+                  self._side(before, opposite, first, corners[3], corners[0])]
+        ring = [start, *along, *around]
+        if before is not None:  # the ring begins at this aggregate
+            ring = ring[-1:] + ring[:-1]
+        return np.concatenate(ring)
+
+    def _on_wall(self, place: int, before: int | None, after: int | None, start: np.ndarray,
+                 end: np.ndarray) -> Iterator[np.ndarray]:
+        """Pieces of nodes along a wall and around the aggregates on it, without the last node."""
+        wall = self._walls[place]
+        order = self._along[place]
+        beside = order[0 if before is None else order.index(before) + 1:
+                       len(order) if after is None else order.index(after)]
+        skipped = 0
+        if before is not None:
+            start, skipped = self._contact(before, wall)[1], 1
+        for number in beside:
+            to, back = self._contact(number, wall)
+            yield self._store.add(self._sizes.path(start, to)[skipped:])
+            first, last = _contact(self._outlines[number], wall)
+            yield self._own[number][_backwards(first, last, len(self._own[number]))]
+            start, skipped = back, 1
+        if after is not None:
+            end = self._contact(after, wall)[0]
+        yield self._store.add(self._sizes.path(start, end)[skipped:])
+
+    def _side(self, number: int | None, wall: Wall, other: Wall, start: np.ndarray,
+              end: np.ndarray) -> np.ndarray:
+        """Nodes of the side of an aggregate from wall to wall, or of an end of the mesh without the
+        last one."""
+        if number is None:
+            return self._store.add(self._sizes.path(start, end))
+        outline = self._outlines[number]
+        first, _ = _contact(outline, wall)
+        _, last = _contact(outline, other)
+        return self._own[number][_backwards(first, last, len(outline.points))]
+
+    def _contact(self, number: int, wall: Wall) -> tuple[np.ndarray, np.ndarray]:
+        """(2,) um, an aggregate's first and last point on a wall, along the fluid."""
+        first, last = _contact(self._outlines[number], wall)
+        points = self._outlines[number].points
+        return points[first], points[last]
 
 
 def _contact(outline: Outline, wall: Wall) -> tuple[int, int]:

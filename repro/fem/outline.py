@@ -8,19 +8,22 @@ has the nodes 2 k, 2 k + 1 and 2 k + 2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
 import numpy as np
+import shapely
 
 from repro.errors import OutsidePore
 from repro.fem.brief import brief
-from repro.fem.walls import FREE, Wall, Walls, channel_walls, numbers_at, on_any
+from repro.fem.walls import FREE, Seat, Wall, Walls, channel_walls, numbers_at, on_any
 
 #: A corner of the shape at t = 0 that keeps its node turns by more than this. The samples of a
 #: spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
 SHARP = np.pi / 3
+#: Straight lines in place of an arc for distances, which then err by 1/256 of the arc's sag or less.
+ON_ARC = 16
 
 
 @brief
@@ -30,7 +33,7 @@ class Outline:
 
     points: (M, 2) um; wall: (M,) number of the wall, or FREE; fixed: (M,) True where x is always
     fixed; origin: (M, 2) um, where the material of each node was at t = 0; geometry: 1, edges are
-    straight; 2, they are arcs.
+    straight; 2, they are arcs; seat: where its seed sat.
     """
 
     points: np.ndarray
@@ -38,6 +41,7 @@ class Outline:
     fixed: np.ndarray
     origin: np.ndarray
     geometry: int = 1
+    seat: Seat = Seat()
 
     @property
     def upstream(self) -> float:
@@ -51,9 +55,8 @@ class Outline:
 
     @property
     def thickness(self) -> float:
-        """Largest distance (um) from the first wall that it touches: the paper's R_aggregate."""
-        touching = self.wall != FREE
-        first = np.flatnonzero(self.wall == self.wall[touching].min())[0]
+        """Largest distance (um) from the wall of its seed: the paper's R_aggregate."""
+        first = np.flatnonzero(self.wall == self.seat.wall)[0]
         return float(np.abs(self._extreme_points[:, 1] - self.points[first, 1]).max())
 
     def nearest(self, wall: Wall) -> tuple[float, float]:
@@ -68,8 +71,27 @@ class Outline:
         return tuple(sorted(free, key=lambda wall: self.nearest(wall)[0]))
 
     def gap(self, walls: Walls) -> float:
-        """The thinnest film (um) at a wall without contact, zero if it touches all of them."""
-        return min((self.nearest(wall)[0] for wall in self.untouched(walls)), default=0.0)
+        """The thinnest film (um) at a wall without contact, infinite if it touches all of them."""
+        return min((self.nearest(wall)[0] for wall in self.untouched(walls)), default=inf)
+
+    def distances(self, points: np.ndarray) -> np.ndarray:
+        """(M,) um, distances of points (M, 2) from the curve."""
+        return shapely.distance(shapely.points(points), self._ring)
+
+    def film(self, other: Outline) -> tuple[float, np.ndarray]:
+        """The thinnest film (um) between two aggregates, zero if they touch, and (2,) um, its
+        middle."""
+        line = shapely.shortest_line(shapely.Polygon(self._ring), shapely.Polygon(other._ring))
+        return float(line.length), shapely.get_coordinates(line).mean(axis=0)
+
+    @cached_property
+    def _ring(self) -> shapely.LinearRing:
+        """The curve, with ON_ARC straight lines in place of an arc."""
+        points = self.points
+        if self.geometry == 2:
+            t = np.arange(ON_ARC) / ON_ARC
+            points = np.einsum("ta,kai->kti", parabola(t), self.arcs(points)).reshape(-1, 2)
+        return shapely.LinearRing(points)
 
     def same_contact(self, other: Outline) -> bool:
         """Does each node touch the same wall in both outlines?"""
@@ -92,7 +114,8 @@ class Outline:
         """The polygon through the corners, without middles."""
         if self.geometry == 1:
             return self
-        return Outline(self.points[::2], self.wall[::2], self.fixed[::2], self.origin[::2])
+        return replace(self, points=self.points[::2], wall=self.wall[::2], fixed=self.fixed[::2],
+                       origin=self.origin[::2], geometry=1)
 
     @property
     def edge_wall(self) -> np.ndarray:
@@ -205,7 +228,7 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
     wall_numbers = np.where(np.arange(len(points)) < len(base), wall.number, FREE)
     fixed = np.arange(len(points)) == half
     return Outline(points, wall_numbers[counterclockwise], fixed[counterclockwise], points.copy(),
-                   geometry)
+                   geometry, Seat(wall.number, middle))
 
 
 def polygon(corners: np.ndarray, walls: Walls, geometry: int = 1, smooth: bool = False,

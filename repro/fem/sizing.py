@@ -5,14 +5,15 @@ Lengths in um.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, Wall, Walls, whole_width, width_between
+from repro.fem.walls import FREE, Walls, numbered, whole_width, width_between
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -37,9 +38,9 @@ class Sizing:
     walls: of the pore; refinement: divisor of the sizes; film: thickness of the thinnest
     resolved film (um); gradation: growth of the size with the distance from its source; front:
     further divisor of sizes at the aggregate, for a sharp front of the substrates; contact: size
-    beside the contact lines with the opposite wall (um), infinite for none; seed: x (um) of the
-    middle of the half-disc at t = 0, None for another shape; film_refinement: divisor of the sizes
-    in films, ``refinement`` by default.
+    beside the contact lines with the opposite wall (um), infinite for none; film_refinement:
+    divisor of the sizes in films, ``refinement`` by default; others: outlines of the other
+    aggregates.
     """
 
     walls: Walls
@@ -48,8 +49,8 @@ class Sizing:
     gradation: float = GRADATION
     front: float = 1.0
     contact: float = inf
-    seed: float | None = None
     film_refinement: float | None = None
+    others: tuple[Outline, ...] = ()
 
     @property
     def width(self) -> float:
@@ -61,11 +62,12 @@ class Sizing:
         """W, or the width with the mirror image beyond a plane of symmetry (um)."""
         return whole_width(self.walls)
 
-    @property
-    def middle(self) -> np.ndarray | None:
-        """(2,) um, middle of the half-disc at t = 0, None for another shape."""
-        seeded, *_ = self.walls
-        return None if self.seed is None else np.array([self.seed, seeded.y])
+    def middle(self, outline: Outline) -> np.ndarray | None:
+        """(2,) um, middle of an outline's half-disc at t = 0, None for another shape."""
+        seat = outline.seat
+        if seat.middle is None:
+            return None
+        return np.array([seat.middle, numbered(self.walls, seat.wall).y])
 
     @property
     def largest(self) -> float:
@@ -114,8 +116,7 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
     """(M,) size (um) that grows from the contact lines with the opposite wall; inf without them."""
-    seeded, *_ = sizing.walls
-    on = (outline.wall != FREE) & (outline.wall != seeded.number)
+    on = (outline.wall != FREE) & (outline.wall != outline.seat.wall)
     if sizing.contact == inf or not on.any():
         return inf
     lines = outline.points[on & ~(np.roll(on, 1) & np.roll(on, -1))]
@@ -131,19 +132,29 @@ def too_coarse(outline: Outline, sizing: Sizing) -> bool:
 
 
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
-    """(M,) element size (um) in the fluid between each node and the walls without contact.
+    """(M,) element size (um) in the fluid between each node and the walls without contact, and
+    between it and the other aggregates.
 
     It is a tenth of the film's thickness over the refinement there, but at least the size in the
     thinnest resolved film, because thinner films close.
     """
-    sizes = [_film_sizes(outline, sizing, wall) for wall in outline.untouched(sizing.walls)]
+    films = [wall.film(outline.points) for wall in outline.untouched(sizing.walls)]
+    films += [other.distances(outline.points) for other in sizing.others]
+    sizes = [_film_sizes(film, sizing) for film in films]
     return np.min([np.full(len(outline.points), inf), *sizes], axis=0)
 
 
-def _film_sizes(outline: Outline, sizing: Sizing, wall: Wall) -> np.ndarray:
-    """(M,) element size (um) in the fluid between each node and a wall without contact."""
-    film = np.maximum(wall.film(outline.points), sizing.film)
-    return film / ACROSS_FILM / (sizing.film_refinement or sizing.refinement)
+def _film_sizes(film: np.ndarray, sizing: Sizing) -> np.ndarray:
+    """(M,) element size (um) in films of a thickness (M,) um."""
+    size = np.maximum(film, sizing.film) / ACROSS_FILM
+    return size / (sizing.film_refinement or sizing.refinement)
+
+
+def each_beside(outlines: Sequence[Outline], sizing: Sizing) -> Iterator[tuple[Outline, Sizing]]:
+    """Each outline, with the element sizes beside the others."""
+    for outline in outlines:
+        others = tuple(other.corners for other in outlines if other is not outline)
+        yield outline, replace(sizing, others=others)
 
 
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
@@ -161,7 +172,7 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
     sizes = [near]
     for wall in outline.untouched(sizing.walls):
         sources.append(np.column_stack([outline.points[free, 0], np.full(len(near), wall.y)]))
-        sizes.append(_film_sizes(outline, sizing, wall)[free])
+        sizes.append(_film_sizes(wall.film(outline.points), sizing)[free])
     return np.vstack(sources), np.concatenate(sizes)
 
 
@@ -204,7 +215,8 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
             parts = outline.geometry * split_count(polygon, keep, sizes)
             pieces.append((np.full(parts, keep[0]), np.arange(parts) / parts))
     edges, t = zip(*pieces)
-    return placed(outline, np.concatenate(edges), np.concatenate(t), sizing.middle)
+    return placed(outline, np.concatenate(edges), np.concatenate(t),
+                  sizing.middle(outline))
 
 
 def halved(outline: Outline, cut: np.ndarray) -> Outline:
@@ -282,7 +294,8 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
     points[on, 1] = outline.points[corner[on], 1]
     points[first] = outline.points[corner[first]]
     origin[first] = outline.origin[corner[first]]
-    return Outline(points, wall, first & outline.fixed[corner], origin, outline.geometry)
+    return replace(outline, points=points, wall=wall, fixed=first & outline.fixed[corner],
+                   origin=origin)
 
 
 def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """The walls of the pore (2.1), as data: where they are, and what they do.
 
 A stage asks a wall; no stage knows which one it is. The channel is 0 <= y <= W, and a pore has a
-list of two walls: first the one on which seeds sit, then the opposite one. Nodes and contact lines
-name their wall by its number, its place in the list counted from one; FREE is no wall.
+list of two walls. An aggregate sees them from its seat: first the wall of its seed, then the
+opposite one. Nodes and contact lines name their wall by its number; FREE is no wall.
 
 No substrate flows through a wall. This is the natural condition of the weak form (11)-(12), so the
 transport asks nothing.
@@ -15,7 +15,7 @@ there is half of the film between the aggregate and its mirror image.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -33,8 +33,8 @@ class Wall:
     or -1. An aggregate's boundary runs counterclockwise, so along a wall it runs in the direction
     of x if the normal is 1, else against it.
 
-    no_slip: is the velocity along the wall zero, too (5)? bonded: does biomass that touches the
-    wall keep its place, or slide along it (2.3.3)? keeps_point: does the middle of a new contact
+    no_slip: is the velocity along the wall zero, too (5)? bonded: does an aggregate whose seed sat
+    on the wall keep its place there, or slide along it (2.3.3)? keeps_point: does the middle of a new contact
     surface keep its x (2.3.3)? mirrors: is it a plane of symmetry?
     """
 
@@ -65,8 +65,25 @@ class Wall:
         return points[..., 1] == self.y
 
 
-#: The walls of a pore: first the one on which seeds sit.
+#: The walls of a pore, or those that an aggregate sees: first that of its seed.
 Walls: TypeAlias = tuple[Wall, ...]
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where the seed of an aggregate sat.
+
+    wall: number of its wall; middle: x (um) of the middle of the half-disc, None for another shape.
+    """
+
+    wall: int = BOTTOM
+    middle: float | None = None
+
+    def walls(self, walls: Walls) -> Walls:
+        """The walls that the aggregate sees: its own one, then the opposite one, along which it
+        slides."""
+        own = numbered(walls, self.wall)
+        return own, *(replace(wall, bonded=False) for wall in walls if wall != own)
 
 
 #: What a wall does, by its word in a scene.
@@ -78,9 +95,11 @@ CONDITIONS: dict[str, dict[str, bool]] = {
 def channel_walls(width: float, bonded: bool = False, upper: str = "no slip") -> Walls:
     """The walls of the channel 0 <= y <= ``width`` (um).
 
-    bonded: biomass to the lower one? upper: condition on the upper one, of ``CONDITIONS``.
+    bonded: each aggregate to the wall of its seed? upper: condition on the upper one, of
+    ``CONDITIONS``.
     """
-    return Wall(BOTTOM, 0.0, 1.0, bonded=bonded), Wall(TOP, width, -1.0, **CONDITIONS[upper])
+    return (Wall(BOTTOM, 0.0, 1.0, bonded=bonded),
+            Wall(TOP, width, -1.0, **{"bonded": bonded, **CONDITIONS[upper]}))
 
 
 def numbered(walls: Walls, number: int) -> Wall:

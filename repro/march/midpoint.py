@@ -57,7 +57,8 @@ class Halfway:
 
     duration: h, of the entire step; first: rates at its start; expansion: the aggregate half way;
     solved: flow and substrates half way; rates: half way, at the points of the mesh at the start;
-    produced: growth of active and of inert biomass over the entire step, um2 mg/L; generated:
+    produced: growth of active and of inert biomass of each aggregate over the entire step, um2
+    mg/L; generated:
     meshes that the step has generated so far; end: the aggregate at the end, None before it is
     known.
     """
@@ -67,7 +68,7 @@ class Halfway:
     expansion: Expansion
     solved: Solved
     rates: Rates
-    produced: tuple[float, float]
+    produced: tuple[tuple[float, float], ...]
     generated: tuple[GeneratedMesh, ...]
     end: Expansion | None = None
 
@@ -80,11 +81,11 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     StageError if a stage fails.
     """
     first = stages.rates(previous, solved)
-    gap = min(outline.gap(previous.mesh.walls) for outline in previous.outlines)
     try:
         half = solve_halfway(stages, previous, solved, first, duration, search)
     except FirstContact as early:
-        return Attempt(None, 0.0, (gap, gap - 2 * (gap - early.gap)))
+        before, halfway = early.gaps
+        return Attempt(None, 0.0, (before, before - 2 * (before - halfway)))
     change = biomass.change(first, half.rates, previous.space.reaction.dx)
     if change > largest_change:
         return Attempt(None, change)
@@ -93,7 +94,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     try:
         expansion = _expand(stages, previous, after, half, 1.0, search)
     except FirstContact as early:
-        return Attempt(None, 0.0, (gap, early.gap))
+        return Attempt(None, 0.0, early.gaps)
     expanded = expansion.pore
     refuse_outside(stages.channel, previous, expanded)
     refuse_fold(expanded)
@@ -109,15 +110,14 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     complete = replace(half, generated=half.generated + generated, end=expansion)
     inner = partial(interpolate, stages, previous, solved, complete)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
-    return Attempt(step, change, (gap, expansion.gap) if makes_contact else None)
+    return Attempt(step, change, expansion.gaps if makes_contact else None)
 
 
 def _with_line_speeds(new: Pore, previous: Pore, expansion: Expansion, duration: float) -> Pore:
     """The pore with the speeds of contact lines in a step; unknown after a first contact."""
-    walls = previous.mesh.walls
     bodies = []
     for number, (before, after) in enumerate(zip(previous.bodies, new.bodies)):
-        makes_contact = after.touches_all(walls) and not before.touches_all(walls)
+        makes_contact = after.spans and not before.spans
         speeds = contact_lines.speeds(expansion.advances, number, duration)
         bodies.append(replace(after, line_speeds=None if makes_contact else speeds))
     return replace(new, bodies=tuple(bodies))
@@ -162,11 +162,10 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
     after = grow(middle, rates, duration)
     if mesh is None:
         rates = _carry_rates_back(middle, previous, expansion, rates)
-    active_growth = float((after.active - middle.active).sum())
-    inert_growth = float((after.inert - middle.inert).sum())
+    produced = tuple((float((new.active - old.active).sum()), float((new.inert - old.inert).sum()))
+                     for old, new in zip(middle.bodies, after.bodies))
     generated = () if mesh else (GeneratedMesh(shape, middle),)
-    return Halfway(duration, first, expansion, solution, rates, (active_growth, inert_growth),
-                   generated)
+    return Halfway(duration, first, expansion, solution, rates, produced, generated)
 
 
 def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
@@ -200,16 +199,21 @@ def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rate
     return Rates(growth, remains)
 
 
-def _match_production(previous: Pore, after: Pore, produced: tuple[float, float]) -> Pore:
-    """Correct the growth of biomass to that computed half way, to the last bit.
+def _match_production(previous: Pore, after: Pore,
+                      produced: tuple[tuple[float, float], ...]) -> Pore:
+    """Correct the growth of each aggregate to that computed half way, to the last bit.
 
     The difference is due to the interpolation of the rates. It is added in proportion to the active
     biomass.
     """
-    share = previous.active / previous.active.sum()
-    missing = [expected - float((new - old).sum()) for expected, new, old in
-               zip(produced, (after.active, after.inert), (previous.active, previous.inert))]
-    return after.with_masses(after.active + missing[0] * share, after.inert + missing[1] * share)
+    bodies = []
+    for old, new, (active, inert) in zip(previous.bodies, after.bodies, produced):
+        share = old.active / old.active.sum()
+        missing = [active - float((new.active - old.active).sum()),
+                   inert - float((new.inert - old.inert).sum())]
+        bodies.append(replace(new, active=new.active + missing[0] * share,
+                              inert=new.inert + missing[1] * share))
+    return replace(after, bodies=tuple(bodies))
 
 
 def _guess_substrates(start: Solved, half: Halfway, part: float) -> Concentrations:
@@ -234,12 +238,12 @@ def _extrapolate_substrates(first: Concentrations, second: Concentrations,
 
 
 def _scale_shape(previous: Pore, after: Pore) -> Pore:
-    """Initial guess of the shape: a free aggregate is scaled by the root of its growth."""
-    if previous.contact:
-        return after
+    """Initial guess of the shape: an aggregate on one wall is scaled by the root of its growth."""
     points = previous.mesh.points.copy()
     for before, grown, region, outline in zip(previous.bodies, after.bodies, previous.mesh.regions,
                                               previous.outlines):
+        if before.spans:
+            continue
         fixed = outline.points[outline.fixed][:1]
         scale = np.sqrt(grown.mass / before.mass)
         points[region.nodes] = fixed + (points[region.nodes] - fixed) * scale

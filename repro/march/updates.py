@@ -115,7 +115,7 @@ def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:
         return stages.expand(previous, grown)
     except FirstContact as early:
         _, opposite = previous.mesh.walls
-        beyond = -early.gap * opposite.part
+        beyond = -early.gaps[1] * opposite.part
         raise GrowthError(f"the aggregate passes the opposite wall by {beyond:.3g} um before "
                           "its contact; try a shorter growth.time_step") from None
 

@@ -141,7 +141,7 @@ def fluid_load(loading: Loading, pore: Pore, solved: Solved) -> Load:
     nodes = pore.region.nodes
     forces = pore.mesh.of_region(pore.region, fluid_forces(loading, pore, solved))
     outline = pore.boundary
-    seeded, *_ = pore.mesh.walls
+    seeded, *_ = pore.walls
     on = outline.points[outline.wall == seeded.number, 0]
     x, y = (pore.mesh.points[nodes] - [(on.min() + on.max()) / 2, seeded.y]).T
     moment = float(x @ forces[:, 1] - y @ forces[:, 0])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro.fem.brief import brief
-from repro.fem.walls import Walls
+from repro.fem.walls import FREE, Seat
 from repro.model.configuration import FromStart, ReferenceConfiguration
 from repro.model.solid import Solid
 
@@ -27,7 +27,7 @@ class Body:
     its triangles; solid: the aggregate as it was at t = 0; configuration: from which strain counts;
     line_speeds: (2, 2) um/h, speeds of the contact lines, None if unknown. A row has the lines of
     one wall, the lower wall first: the line where a free surface begins along the loop, then the
-    line where one ends. origin_known: False once present places have replaced places at t = 0
+    line where one ends. seat: where its seed sat. origin_known: False once present places have replaced places at t = 0
     that fold. This happens only if strain does not count from t = 0.
     """
 
@@ -40,6 +40,7 @@ class Body:
     configuration: ReferenceConfiguration = FromStart()
     line_speeds: np.ndarray | None = None
     origin_known: bool = True
+    seat: Seat = Seat()
 
     @property
     def reference(self) -> np.ndarray:
@@ -61,6 +62,7 @@ class Body:
         """X_A + X_I, integrated over the aggregate, um2 mg/L."""
         return float(self.active.sum() + self.inert.sum())
 
-    def touches_all(self, walls: Walls) -> bool:
-        """Does it touch all walls?"""
-        return all((self.wall == wall.number).any() for wall in walls)
+    @property
+    def spans(self) -> bool:
+        """Does it touch both walls?"""
+        return bool(np.ptp(self.wall[self.wall != FREE]) > 0)

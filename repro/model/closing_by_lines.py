@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import inf
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class ByLines(Closing):
 
     def __post_init__(self) -> None:
         keys = self.mechanics.keys
-        walls = self.grown.mesh.walls
+        walls = self.grown.walls
         self._rule = Clearance(walls, keys.minimum_film, keys.minimum_contact_angle)
         self._start = self.start.mesh.points, self.start.pressure
         self._shapes = [(np.zeros(0), *self._start)]
@@ -76,22 +77,23 @@ class ByLines(Closing):
         wall = grown.body.wall
         lines = contact_lines.lines_of(grown.boundary)
         _place_lines(grown.boundary, lines, self._advances)
-        gap = 0.0
-        shape = self.settle(wall, lines) if grown.spans and not search.stationary else None
+        gaps = inf, inf
+        shape = self.settle(wall, lines) if grown.body.spans and not search.stationary else None
         if shape is None:
             shape = self.solve(wall, lines)
-            gap = shape.pore.boundary.gap(self._rule.walls)
-            if not grown.spans and gap < film:
-                search.refuse_late(gap, film)
+            gaps = (grown.boundary.gap(self._rule.walls),
+                    shape.pore.boundary.gap(self._rule.walls))
+            if gaps[1] < film:
+                search.refuse_late(gaps, film)
                 wall, lines, shape = self._touch(shape)
             if not search.stationary:
                 shape = self._search(wall, lines, shape)
         rest = with_new_surfaces(shape.pore)
-        return replace(shape, pore=rest, iterations=self.iterations, gap=gap)
+        return replace(shape, pore=rest, iterations=self.iterations, gaps=gaps)
 
     def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion) -> Expansion:
         """Move lines until all are accepted, or until Newton's method settles a first contact."""
-        settles = not self.grown.spans
+        settles = not self.grown.body.spans
         for _ in range(CONTACT_ROUNDS):
             outline = shape.pore.boundary
             for line in lines:
@@ -159,7 +161,8 @@ class ByLines(Closing):
                                         patient=self.search.patient)
         self.iterations += iterations
         divisions = () if division is None else (division,)
-        expansion = Expansion(shape, iterations, 0.0, divisions, self._lengths(wall, lines))
+        expansion = Expansion(shape, iterations, divisions=divisions,
+                              advances=self._lengths(wall, lines))
         trial = advances, expansion.position, shape.pressure[: self.grown.mesh.corners]
         self._shapes = [*self._shapes[-1:], trial]
         return expansion
@@ -192,7 +195,8 @@ class ByLines(Closing):
         placed = coupled.placed
         shape = placed.pore.placed(coupled.position, coupled.pressure)
         divisions = () if placed.division is None else (placed.division,)
-        return Expansion(shape, self.iterations, 0.0, divisions, self._lengths(wall, lines))
+        return Expansion(shape, self.iterations, divisions=divisions,
+                         advances=self._lengths(wall, lines))
 
     def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> Advances:
         """{(number, wall, direction): um} by which lines have advanced."""

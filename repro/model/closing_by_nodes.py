@@ -24,22 +24,23 @@ class ByNodes(Closing):
         grown = self.grown
         film = self.mechanics.keys.minimum_film
         angle = self.mechanics.keys.minimum_contact_angle
-        walls = grown.mesh.walls
+        walls = grown.walls
         first = self.start if self.search.stationary else grown
         shape = replace(grown.with_body(wall=first.body.wall), space=self.start.space,
                         pressure=self.start.pressure)
         iterations = 0
         gaps: list[float] = []
+        before = grown.boundary.gap(walls)
         for _ in range(CONTACT_ROUNDS):
             last = None if gaps else grown.mesh.points[grown.region.nodes]
             shape, used = equilibrium(self.mechanics, grown, shape, self.forces, last=last)
             iterations += used
             gaps.append(shape.boundary.gap(walls))
-            if not shape.spans:
-                self.search.refuse_late(gaps[-1], film)
+            if not shape.body.spans:
+                self.search.refuse_late((before, gaps[-1]), film)
             joins = closing_nodes(shape.boundary, walls, film, angle)
             if not joins.any():
-                return Expansion(with_new_surfaces(shape), iterations, gaps[0])
+                return Expansion(with_new_surfaces(shape), iterations, (before, gaps[0]))
             shape = shape.with_body(wall=np.where(joins != FREE, joins, shape.body.wall))
         raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds")
 

@@ -78,7 +78,7 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     if mechanics.fluid is None:
         return shape_under(mechanics, grown, theta, start, None, search)
     water = traction.SurroundingFlow(mechanics.fluid, grown)
-    shape = Expansion(grown, 0, 0.0)
+    shape = Expansion(grown, 0)
     iterations = 0
     rounds = _Rounds()
     while not rounds.stalled:
@@ -90,7 +90,7 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
         if rounds.agree(min(outline.thickness for outline in shape.pore.outlines)):
             return replace(shape, iterations=iterations)
         stationary = len(rounds.moves) >= SETTLING_ROUNDS
-        landing = -np.inf if shape.pore.contact else search.landing
+        landing = -np.inf if shape.pore.spanning > grown.spanning else search.landing
         search = replace(search, advances=shape.advances, stationary=stationary, landing=landing)
         if stationary and not shape.divisions:
             start = replace(start, bodies=tuple(
@@ -158,7 +158,7 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
     bodies = [replace(body, theta=expansion,
                       configuration=body.configuration.restarted(mesh.points[region.nodes]))
               for body, expansion, region in zip(grown.bodies, theta, mesh.regions, strict=True)]
-    shape = Expansion(replace(grown, bodies=tuple(bodies)), 0, np.inf)
+    shape = Expansion(replace(grown, bodies=tuple(bodies)), 0)
     for number, region in enumerate(mesh.regions):
         own = None if forces is None else mesh.of_region(region, forces)
         closing = CLOSINGS[mesh.geometry](mechanics, shape.pore.focused(number),

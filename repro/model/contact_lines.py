@@ -80,11 +80,11 @@ class SearchOptions:
     patient: bool = True
     advances: Advances = field(default_factory=dict)
 
-    def refuse_late(self, gap: float, film: float) -> None:
-        """Raise FirstContact if the gap (um) at the first contact is much less than the least film
-        (um)."""
-        if gap < self.landing * film:
-            raise FirstContact(gap)
+    def refuse_late(self, gaps: tuple[float, float], film: float) -> None:
+        """Raise FirstContact if the second of two gaps (um) is much less than the least film (um).
+        """
+        if gaps[1] < self.landing * film:
+            raise FirstContact(gaps)
 
 
 PATIENT = SearchOptions()
@@ -93,12 +93,12 @@ PATIENT = SearchOptions()
 class FirstContact(Exception):
     """The film to the opposite wall is much thinner than the least film at the end of a step.
 
-    gap: um, the thickness of that film.
+    gaps: um, the thickness of that film at the start of the step and at its end.
     """
 
-    def __init__(self, gap: float):
-        super().__init__(gap)
-        self.gap = gap
+    def __init__(self, gaps: tuple[float, float]):
+        super().__init__(gaps)
+        self.gaps = gaps
 
 
 @dataclass(frozen=True)

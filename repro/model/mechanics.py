@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 
@@ -52,15 +53,16 @@ class Expansion:
     """Aggregates in their new shapes.
 
     pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
-    within an arc; iterations: of Newton's method; gap: um, the thinnest film at a wall without
-    contact before films closed; divisions: of the mesh of the grown pore, one after the other, for
+    within an arc; iterations: of Newton's method; gaps: um, of the aggregate with the thinnest film
+    at a wall that it does not touch, this film in the old and in the new shape before films close;
+    divisions: of the mesh of the grown pore, one after the other, for
     each aggregate with lines within arcs; advances: {(number, wall, direction): um} by which
     contact lines of an aggregate, by its place in the list, have advanced along its grown outline.
     """
 
     pore: Pore
     iterations: int
-    gap: float
+    gaps: tuple[float, float] = (inf, inf)
     divisions: tuple[Division, ...] = ()
     advances: Advances = field(default_factory=dict)
 
@@ -74,7 +76,8 @@ class Expansion:
 
     def joined(self, other: Expansion) -> Expansion:
         """This expansion and then that of another aggregate in its pore."""
-        return Expansion(other.pore, self.iterations + other.iterations, min(self.gap, other.gap),
+        gaps = min(self.gaps, other.gaps, key=lambda each: each[1])
+        return Expansion(other.pore, self.iterations + other.iterations, gaps,
                          self.divisions + other.divisions, {**self.advances, **other.advances})
 
     def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
@@ -146,7 +149,7 @@ def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
     touched = shape.body.wall
     fixed = shape.body.fixed
     target = shape.mesh.points[shape.region.nodes].copy()
-    for wall in shape.mesh.walls:
+    for wall in shape.walls:
         target[rim[touched == wall.number], 1] = wall.y
         fixed = fixed | (wall.bonded & wall.holds(before[rim]))
     target[rim[fixed], 0] = before[rim[fixed], 0]
@@ -161,7 +164,7 @@ def supports_of(solid: Solid, shape: Pore, forces: np.ndarray | None) -> list[Su
     """
     outline = shape.boundary
     rim = shape.region.own_loop
-    walls = shape.mesh.walls
+    walls = shape.walls
     bearing = []
     for wall in walls:
         edges = rim[outline.edges_on(wall.number)]
@@ -187,7 +190,7 @@ def with_new_surfaces(pore: Pore) -> Pore:
     """The pore with fixed points in the middles of contact surfaces that have just formed."""
     outline = pore.boundary
     fixed = outline.fixed
-    for wall in pore.mesh.walls:
+    for wall in pore.walls:
         if wall.keeps_point and not outline.fixed[outline.wall == wall.number].any():
             fixed = fixed | middle_of(outline, wall.number)
     return pore.with_body(fixed=fixed)

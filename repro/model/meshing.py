@@ -120,14 +120,12 @@ def sized(scene: Scene) -> Sizing:
 
     Boundary layers refine all elements except those in films: a film is thinner than its layers.
     """
-    seed = scene.aggregate
-    middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
     across = scene.numerics.contact_elements
     if scene.flow:
         across = max(across, resistance_of(scene.flow).contact_elements)
     return Sizing(walls_of(scene), resolution(scene), least, scene.numerics.gradation,
-                  contact=least / across if across else inf, seed=middle,
+                  contact=least / across if across else inf,
                   film_refinement=scene.numerics.refinement)
 
 
@@ -253,7 +251,7 @@ class Seeding:
         solid = material(space, region, space.mesh.points[region.nodes], energy_of(self.growth))
         theta = np.ones((len(region.triangles), len(solid.shape.table.weights)))
         return Body(outline.wall, outline.fixed, total - inert, inert, theta, solid,
-                    configuration_of(self.growth, solid.reference))
+                    configuration_of(self.growth, solid.reference), seat=outline.seat)
 
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:

@@ -13,6 +13,7 @@ from repro.fem.brief import brief
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
+from repro.fem.walls import Walls
 from repro.model.body import Body
 from repro.scene import needed
 
@@ -68,7 +69,7 @@ class Pore:
     @property
     def spanning(self) -> int:
         """Number of aggregates that touch all walls."""
-        return sum(body.touches_all(self.mesh.walls) for body in self.bodies)
+        return sum(body.spans for body in self.bodies)
 
     @property
     def accumulates(self) -> bool:
@@ -85,7 +86,7 @@ class Pore:
         """Boundaries of the aggregates."""
         mesh = self.mesh
         return tuple(Outline(mesh.points[region.loop], body.wall, body.fixed,
-                             body.reference[region.own_loop], mesh.geometry)
+                             body.reference[region.own_loop], mesh.geometry, body.seat)
                      for body, region in zip(self.bodies, mesh.regions))
 
     @property
@@ -162,9 +163,9 @@ class Pore:
         return needed(self.outline, "an aggregate")
 
     @property
-    def spans(self) -> bool:
-        """Does it touch all walls?"""
-        return self.body.touches_all(self.mesh.walls)
+    def walls(self) -> Walls:
+        """The walls that it sees: that of its seed, then the opposite one."""
+        return self.body.seat.walls(self.mesh.walls)
 
     def with_body(self, **changes: Any) -> Pore:
         """The pore with changes of its aggregate."""

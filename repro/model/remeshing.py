@@ -142,9 +142,9 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
     length = meshing.channel.length
     if not same_contact(expanded, previous):
         return None
-    for outline in expanded.outlines:
+    for outline, sizes in sizing.each_beside(expanded.outlines, meshing.sizes):
         if (sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, length)
-                or sizing.too_coarse(outline.corners, meshing.sizes)):
+                or sizing.too_coarse(outline.corners, sizes)):
             return None
     moved = mesh_motion.moved(mesh, expanded.mesh.points[mesh.body])
     return moved if moved.acceptable() else None

@@ -13,6 +13,7 @@ from repro.errors import CheckpointError
 from repro.fem.linear import Method
 from repro.fem.mesh import Mesh, Region
 from repro.fem.space import Space
+from repro.fem.walls import Seat
 from repro.march.balance import Ledger
 from repro.march.state import Compression, RestartState
 from repro.march.step_control import StepControl
@@ -49,6 +50,7 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
              "iterations": state.iterations, "row_h": float(state.row),
              "ledgers": list(map(astuple, state.ledgers)),
              "origin_known": all(body.origin_known for body in pore.bodies),
+             "seats": [astuple(body.seat) for body in pore.bodies],
              "compression": astuple(state.compression)}
     return plain, arrays
 
@@ -100,5 +102,7 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
 def _body(scene: Scene, space: Space, region: Region, plain: dict, arrays: Arrays) -> Body:
     solid = material(space, region, arrays["reference"], energy_of(scene.growth))
     configuration = configuration_of(scene.growth, arrays.get("last", solid.reference))
+    (seat,) = plain["seats"]
     return Body(solid=solid, configuration=configuration, origin_known=plain["origin_known"],
-                line_speeds=arrays.get("line_speeds"), **{name: arrays[name] for name in OF_BODY})
+                line_speeds=arrays.get("line_speeds"), seat=Seat(*seat),
+                **{name: arrays[name] for name in OF_BODY})

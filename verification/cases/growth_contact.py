@@ -72,10 +72,10 @@ def _first_contact(mechanics, seed, theta) -> tuple[float, Expansion]:
         try:
             shape = contact.expand(mechanics, seed, [theta**part], shapes[-1])
         except FirstContact as contact_made:
-            return contact_made.gap - WALLS.film / 2
+            return contact_made.gaps[1] - WALLS.film / 2
         if not shape.pore.contact:
             shapes.append(shape.pore)
-        return shape.gap - WALLS.film / 2
+        return shape.gaps[1] - WALLS.film / 2
 
     part = next(part for part in np.arange(0.05, 1.0, 0.05) if gap(part) < WALLS.film / 2)
     part = brentq(gap, part - 0.05, part, xtol=1e-3)

@@ -1224,11 +1224,11 @@ MUTANTS = (
          "try:\n"
          "    expansion = _expand(stages, previous, after, half, 1.0, search)\n"
          "except FirstContact as early:\n"
-         "    return Attempt(None, 0.0, (gap, early.gap))",
+         "    return Attempt(None, 0.0, early.gaps)",
          "try:\n"
          "    expansion = _expand(stages, previous, after, half, 1.0, search)\n"
          "except FirstContact as early:\n"
-         "    return Attempt(None, 0.0, (gap, early.gap))",
+         "    return Attempt(None, 0.0, early.gaps)",
          f"{STEPPING}a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes[midpoint]"),
         ("grown-twice-half-way",
          "After a new mesh half way, the biomass grown so far grows over the entire step.",
@@ -2178,7 +2178,7 @@ MUTANTS = (
          "Edges that are too long require no new mesh.",
          "moved_mesh",
          "sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, length)\n"
-         "    or sizing.too_coarse(outline.corners, meshing.sizes)",
+         "    or sizing.too_coarse(outline.corners, sizes)",
          "sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, length)",
          f"{NEW_MESH}a_new_mesh_is_due_if_one_criterion_requires_it"),
         ("poor-mesh-kept",
