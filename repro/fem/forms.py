@@ -63,7 +63,7 @@ class Basis:
     def load(self, f: np.ndarray) -> np.ndarray:
         """(T, ..., k) of (f, v), from f dx (T, ..., q), in one matrix product."""
         flat = f.reshape(-1, f.shape[-1])
-        return (flat @ self.values).reshape(*f.shape[:-1], -1)
+        return (flat @ self.values).reshape(*f.shape[:-1], self.values.shape[1])
 
     def flux(self, flux: np.ndarray) -> np.ndarray:
         """(T, m, k) of (q, grad v) for each of m fluxes, from q dx (T, m, q, 2)."""
@@ -92,7 +92,7 @@ class Basis:
     def assemble(self, loads: np.ndarray) -> np.ndarray:
         """(m count,) sums at the nodes of loads (T, m, k) of m components, one after the other, or
         of (T, k)."""
-        parts = loads.reshape(len(self.cells), -1, self.cells.shape[1])
+        parts = loads[:, None] if loads.ndim == 2 else loads
         first = self.count * np.arange(parts.shape[1])
         nodes = self.cells[:, None] + first[:, None]
         return np.bincount(nodes.ravel(), parts.ravel(), self.count * len(first))

@@ -22,7 +22,7 @@ from repro.fem.walls import FREE, Seat, Wall, Walls, channel_walls, numbers_at, 
 #: A corner of the shape at t = 0 that keeps its node turns by more than this. The samples of a
 #: spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
 SHARP = np.pi / 3
-#: Straight lines in place of an arc for distances, which then err by 1/256 of the arc's sag or less.
+#: Straight lines in place of an arc, for distances: they err by up to 1/256 of the arc's sag.
 ON_ARC = 16
 
 

@@ -34,8 +34,8 @@ class Wall:
     of x if the normal is 1, else against it.
 
     no_slip: is the velocity along the wall zero, too (5)? bonded: does an aggregate whose seed sat
-    on the wall keep its place there, or slide along it (2.3.3)? keeps_point: does the middle of a new contact
-    surface keep its x (2.3.3)? mirrors: is it a plane of symmetry?
+    on the wall keep its place there, or slide along it (2.3.3)? keeps_point: does the middle of a
+    new contact surface keep its x (2.3.3)? mirrors: is it a plane of symmetry?
     """
 
     number: int

@@ -34,7 +34,10 @@ ROUND_OFF = 1e-13
 @dataclass(frozen=True)
 class Ledger:
     """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass,
-    then the unmet demand of both substrates (:mod:`repro.model.kinetics`)."""
+    then the unmet demand of both substrates (:mod:`repro.model.kinetics`).
+
+    detached: biomass of the aggregates that have left the pore at the step's end.
+    """
 
     start: float
     end: float
@@ -46,6 +49,7 @@ class Ledger:
     biomass_made: float
     biomass_after: float
     unmet: tuple[float, float] = (0.0, 0.0)
+    detached: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +98,11 @@ def substrate(ledger: Ledger, k: int, room: float = 0.0) -> float:
 
 
 def biomass(ledger: Ledger) -> float:
-    """Relative defect of the biomass: (after - before - made) / after."""
-    missing = ledger.biomass_after - ledger.biomass_before - ledger.biomass_made
-    return missing / ledger.biomass_after
+    """Relative defect of the biomass: (after - before - made) / after, where after includes what
+    has left; zero in a clean channel."""
+    after = ledger.biomass_after + ledger.detached
+    missing = after - ledger.biomass_before - ledger.biomass_made
+    return missing / after if after else missing
 
 
 def demand_terms(kinetics: Kinetics, ledger: Ledger) -> tuple[float, float]:
@@ -114,7 +120,10 @@ def demand_scale(kinetics: Kinetics, ledger: Ledger) -> float:
 
 
 def oxygen_demand(kinetics: Kinetics, ledger: Ledger) -> float:
-    """Relative defect of the oxygen demand: (made - grown + decayed) / :func:`demand_scale`."""
+    """Relative defect of the oxygen demand: (made - grown + decayed) / :func:`demand_scale`; zero
+    in a clean channel, which has no biomass."""
+    if not ledger.biomass_before:
+        return 0.0
     grown, decayed = demand_terms(kinetics, ledger)
     return (ledger.biomass_made - grown + decayed) / demand_scale(kinetics, ledger)
 
@@ -150,7 +159,7 @@ def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     The midpoint rule closes to round-off. In the paper's updates the method of transport bounds the
     error. The bound depends on dt times the fastest rate, k Y + b.
     """
-    if limits.scheme.controls_error:
+    if limits.scheme.controls_error or not ledger.biomass_before:
         return LARGEST
     kinetics = limits.kinetics
     supplies = [kind.supply for kind in limits.substrates.modelled.values()]

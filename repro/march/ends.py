@@ -6,11 +6,15 @@ Each end is an event: a margin that is zero at the event and positive after it.
     tearing       largest tensile stress / growth.tensile_strength - 1
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
+    meeting       1 - film between two aggregates / growth.minimum_film
 
 The largest margin is judged at t = 0, at the end of each step, and on both sides of a jump of the
 scene's tables, where the aggregate takes its new equilibrium at once. If it is positive, shorter
 steps from the same start locate its zero (:func:`locate`): the first of all ends. The run ends with
-that state, because the model has no law for what follows. A margin that becomes positive and
+that state, because the model has no law for what follows. With growth.after_detachment =
+"continue" an aggregate that detaches from its only wall leaves the pore, and the run goes on.
+If it touches both walls and one of them gives way, the run ends: the model has no law for a surface
+that is set free. A margin that becomes positive and
 negative again within one step is not noticed.
 
 Two ends have no margin, and are not located. A step without a smooth equilibrium ends a run as a
@@ -22,6 +26,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import combinations
+from math import inf
 
 from repro.errors import RunEnd, StageError
 from repro.fem.sizing import ACROSS_PORE
@@ -66,6 +72,25 @@ class PoreEnd(RunEnd):
     """
 
 
+class Meeting(RunEnd):
+    """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
+
+    :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
+    failure: the message names the time (h), the aggregates and the place (um).
+
+    Examples
+    --------
+    >>> import repro
+    >>> changes = ['aggregate=[{radius="18 um"}, {radius="18 um", wall="upper"}]',
+    ...            'pore.width="50 um"', "numerics.preset=fast"]
+    >>> try:
+    ...     times = [report.pore.time for report in repro.simulate("base", changes)]
+    ... except repro.Meeting as end:
+    ...     print(str(end)[:24])
+    aggregates 1 and 2 meet
+    """
+
+
 class Detachment(RunEnd):
     """The aggregate detaches from a wall, or tears.
 
@@ -88,10 +113,15 @@ class Detachment(RunEnd):
 
 @dataclass(frozen=True)
 class Event:
-    """An end of a run: its margin in a state, and the exception that reports it there."""
+    """An end of a run: its margin in a state, and the exception that reports it there.
+
+    leaves: place in the list of the aggregate that leaves the pore instead if the scene continues
+    after detachment; None if the run ends.
+    """
 
     margin: float
     end: RunEnd
+    leaves: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,36 +184,62 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(pore.biot / compression.stretch - 1, fold)
+    yield from _meetings(ends.loading.growth.minimum_film, pore)
     if ends.bonding is not None:
-        peak = adhesion.wall_peak(ends.loading, pore, solved)
-        yield _detachment(ends.bonding, pore, peak, "detaches", "its wall must bear")
+        peaks = adhesion.wall_peaks(ends.loading, pore, solved)
+        for number, (body, peak) in enumerate(zip(pore.bodies, peaks)):
+            leaves = None if body.spans else number
+            yield _detachment(ends.bonding, pore, number, peak, "detaches", "its wall must bear",
+                              leaves)
     if ends.tensile is not None:
-        peak = adhesion.tensile_peak(ends.loading, pore, solved)
-        yield _detachment(ends.tensile, pore, peak, "tears", "its tensile stress is")
+        for number, peak in enumerate(adhesion.tensile_peaks(ends.loading, pore, solved)):
+            yield _detachment(ends.tensile, pore, number, peak, "tears", "its tensile stress is")
 
 
-def _detachment(strength: Strength, pore: Pore, peak: Peak, verb: str, subject: str) -> Event:
+def _meetings(least: float, pore: Pore) -> Iterator[Event]:
+    """The events of all pairs of aggregates; least: um, film that closes."""
+    for (one, outline), (other, beside) in combinations(zip(pore.bodies, pore.outlines), 2):
+        film, (x, y) = outline.film(beside)
+        end = Meeting(f"aggregates {one.name} and {other.name} meet at t = {pore.time:g} h: near "
+                      f"x = {x:.4g}, y = {y:.4g} um the film between them is {film:.3g} um, and it "
+                      f"closes below growth.minimum_film, {least:g} um; no model follows")
+        yield Event(1 - film / least, end)
+
+
+def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: str, subject: str,
+                leaves: int | None = None) -> Event:
     """The event of a strength; its message has the stress in the unit that the scene gives."""
     stated = strength.stated
     ratio = peak.value / strength.stress
-    end = Detachment(f"the aggregate {verb} at t = {pore.time:g} h: near x = {peak.x:.4g}, y = "
-                     f"{peak.y:.4g} um {subject} {ratio * stated.number:.3g} {stated.unit}, in "
-                     f"the mean over pore.width / 20; growth.{strength.key} is {stated.text}")
-    return Event(ratio - 1, end)
+    end = Detachment(f"{name_of(pore, number)} {verb} at t = {pore.time:g} h: near x = "
+                     f"{peak.x:.4g}, y = {peak.y:.4g} um {subject} {ratio * stated.number:.3g} "
+                     f"{stated.unit}, in the mean over pore.width / 20; growth.{strength.key} is "
+                     f"{stated.text}")
+    return Event(ratio - 1, end, leaves)
+
+
+def name_of(pore: Pore, number: int) -> str:
+    """An aggregate in messages, by its place in the list."""
+    return f"aggregate {pore.bodies[number].name}" if len(pore.bodies) > 1 else "the aggregate"
 
 
 def elements_to_end(channel: Channel, pore: Pore, side: str) -> float:
     """Distance of the nearest aggregate from an end of the pore, in elements of the fluid."""
-    tip = max(-outline.upstream if side == "upstream" else outline.downstream
-              for outline in pore.outlines)
+    tip = max((-outline.upstream if side == "upstream" else outline.downstream
+               for outline in pore.outlines), default=-inf)
     return (channel.length / 2 - tip) * ACROSS_PORE / channel.width
 
 
 def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
-    """Raise PoreEnd if a shape is too close to an end of the pore for a mesh.
+    """Raise PoreEnd if a shape is too close to an end of the pore for a mesh, and Meeting if two
+    aggregates overlap.
 
     The step from ``previous`` is then too long: the event lies within it.
     """
+    for (one, outline), (other, beside) in combinations(zip(expanded.bodies, expanded.outlines), 2):
+        if outline.film(beside)[0] == 0:
+            raise Meeting(f"aggregates {one.name} and {other.name} meet in the step from "
+                          f"t = {previous.time:g} h")
     for side in ("upstream", "downstream"):
         if elements_to_end(channel, expanded, side) < LEAST_ELEMENTS:
             raise PoreEnd(f"the aggregate reaches the pore's {side} end in the step from "

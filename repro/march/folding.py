@@ -97,6 +97,8 @@ def refuse_density(pore: Pore, maximum_density: float) -> None:
 
     maximum_density: X_m, mg/L.
     """
+    if not pore.bodies:
+        return
     _, least, largest = pore.composition(maximum_density)
     low, high = DENSITIES
     if least < low or largest > high:

@@ -8,7 +8,9 @@ still belong to the uncut step, and the ledger of the cut step closes like the o
 later end restarts from the state before the cut step.
 
 A step ends at a jump of the scene's tables. Its row has the state just after the jump: with forces
-of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 (:func:`settle`).
+of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 (:func:`settle`). A
+step also ends where an aggregate leaves the pore (``growth.after_detachment``). Its row has the
+state just after that, without the aggregate, and its ledger has the mass that has left.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from repro.march.ends import Ends, Reached, locate, nearest_end
 from repro.march.folding import folding, most_compressed, refuse_density
 from repro.march.state import (
     SAME_TIME,
+    Compression,
     InterpolatedState,
     Report,
     RestartState,
@@ -159,10 +162,11 @@ def _grow(course: Course, state: RestartState,
                     yield replace(state, missing=(time, reason)), None
         solved = reached.solved
         event = reached.event
+        detached = len(step.pore.bodies) < len(pore.bodies)
         state = _after_step(state, step, solved, control)
         pore = replace(state.pore, concentrations=solved.concentrations)
         row = _row_time_at(course.rows, pore.time)
-        if course.every_step or row is not None or event.margin > 0:
+        if course.every_step or row is not None or detached or event.margin > 0:
             reported = pore if row is None else replace(pore, time=row)
             report = make_report(state, reported, solved, step.before, shown)
             shown = pore.mesh.topology
@@ -191,10 +195,26 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
     if full.event.margin > 0:
         located = locate(lambda time: reached(*stepping.cut(stages, pore, solved, time)), pore.time,
                          margin, full)
-        return replace(located, step=replace(located.step, within=step.within)), control
+        located = replace(located, step=replace(located.step, within=step.within))
+        while located.event.margin > 0 and stages.growth.continues \
+                and located.event.leaves is not None:
+            located = reached(*_after_detachment(stages, located, located.event.leaves))
+        return located, control
     if stages.tables.jumps(step.pore.time):
         full = reached(*_after_jump(stages, step, after))
     return full, control
+
+
+def _after_detachment(stages: Stages, reached: Reached,
+                      number: int) -> tuple[StepResult, Solved]:
+    """Return the state just after an aggregate, by its place in the list, has left the pore."""
+    step = reached.step
+    gone = step.pore.bodies[number].mass
+    left = stages.without(step.pore, number, reached.solved)
+    after, solved = settle(stages, *stages.grading.solve(left))
+    ledger = replace(step.ledger, biomass_after=step.ledger.biomass_after - gone,
+                     detached=step.ledger.detached + gone)
+    return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 
 
 def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepResult, Solved]:
@@ -235,8 +255,10 @@ def _after_step(state: RestartState, step: StepResult, solved: Solved,
                         newton_counts(solved))
     ledgers = (*state.ledgers, step.ledger)
     remeshes = state.remeshes + step.remeshed
+    detached = len(step.pore.bodies) < len(state.pore.bodies)
+    earlier = Compression() if detached else state.compression  # it may be that of the lost one
     return RestartState(step.pore, control, ledgers, remeshes, counts, state.row,
-                        most_compressed(state.compression, step.pore))
+                        most_compressed(earlier, step.pore))
 
 
 def make_report(state: RestartState, pore: Pore, solved: Solved,

@@ -184,14 +184,20 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> Pore:
 
 def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
     """Largest mean stress that a wall bears in equilibrium, with its coordinates."""
+    return max(wall_peaks(loading, pore, solved), key=lambda peak: peak.value)
+
+
+def wall_peaks(loading: Loading, pore: Pore, solved: Solved) -> list[Peak]:
+    """Largest mean stress that a wall bears from each aggregate in equilibrium."""
     forces = np.zeros_like(pore.mesh.points)
     forces[pore.mesh.body] = wall_forces(loading, at_rest(loading, pore, solved), solved)
     peaks = []
     for outline, region in zip(pore.outlines, pore.mesh.regions):
         touched = outline.edge_wall
-        peaks += [_peak_on(pore, outline, region, wall, forces) for wall in pore.mesh.walls
-                  if not wall.mirrors and (touched == wall.number).any()]
-    return max(peaks, key=lambda peak: peak.value)
+        own = [_peak_on(pore, outline, region, wall, forces) for wall in pore.mesh.walls
+               if not wall.mirrors and (touched == wall.number).any()]
+        peaks.append(max(own, key=lambda peak: peak.value))
+    return peaks
 
 
 def _peak_on(pore: Pore, outline: Outline, region: Region, wall: Wall, forces: np.ndarray) -> Peak:
@@ -272,10 +278,14 @@ def tensile_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
     over the points where growth is integrated. On a mesh without a point so near to a node, L is
     twice the least distance.
     """
+    return max(tensile_peaks(loading, pore, solved), key=lambda peak: peak.value)
+
+
+def tensile_peaks(loading: Loading, pore: Pore, solved: Solved) -> list[Peak]:
+    """:func:`tensile_peak` of each aggregate."""
     rest = at_rest(loading, pore, solved)
-    peaks = [_tensile_peak(loading, rest, body.solid, region)
-             for body, region in zip(rest.bodies, rest.mesh.regions)]
-    return max(peaks, key=lambda peak: peak.value)
+    return [_tensile_peak(loading, rest, body.solid, region)
+            for body, region in zip(rest.bodies, rest.mesh.regions)]
 
 
 def _tensile_peak(loading: Loading, pore: Pore, solid: Solid, region: Region) -> Peak:

@@ -62,7 +62,10 @@ def grow(pore: Pore, rates: Rates, duration: float) -> Pore:
 
 
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:
-    """Mean difference (1/h) of two rates over the aggregate; weight: (r, q) of the points."""
+    """Mean difference (1/h) of two rates over the aggregates, zero without any; weight: (r, q) of
+    the points."""
+    if not weight.size:
+        return 0.0
     return float(np.vdot(weight, np.abs(second.total - first.total)) / weight.sum())
 
 

@@ -27,8 +27,9 @@ class Body:
     its triangles; solid: the aggregate as it was at t = 0; configuration: from which strain counts;
     line_speeds: (2, 2) um/h, speeds of the contact lines, None if unknown. A row has the lines of
     one wall, the lower wall first: the line where a free surface begins along the loop, then the
-    line where one ends. seat: where its seed sat. origin_known: False once present places have replaced places at t = 0
-    that fold. This happens only if strain does not count from t = 0.
+    line where one ends. seat: where its seed sat; name: in messages. origin_known: False once
+    present places have replaced places at t = 0 that fold. This happens only if strain does not
+    count from t = 0.
     """
 
     wall: np.ndarray
@@ -41,6 +42,7 @@ class Body:
     line_speeds: np.ndarray | None = None
     origin_known: bool = True
     seat: Seat = Seat()
+    name: str = "1"
 
     @property
     def reference(self) -> np.ndarray:

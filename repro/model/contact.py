@@ -75,7 +75,7 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     thickness counts under the forces of the open pore, because a closed pore has larger forces.
     """
     start = guess or grown
-    if mechanics.fluid is None:
+    if mechanics.fluid is None or not grown.bodies:
         return shape_under(mechanics, grown, theta, start, None, search)
     water = traction.SurroundingFlow(mechanics.fluid, grown)
     shape = Expansion(grown, 0)

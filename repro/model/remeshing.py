@@ -182,10 +182,41 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     new = Space(mesh)
     at = _located_in(expanded, mesh)
     bodies = _on_new_mesh(new, expanded, outlines, at)
-    supplied = at_time(rules.substrates, expanded.time if speed else 0.0)
-    substrates = transfer_substrates(supplied, previous.space, new, expanded.concentrations, speed)
+    substrates = _carried(rules, previous, expanded, new, speed)
     target = replace(expanded, space=new, bodies=bodies, concentrations=substrates)
     return _transferred(rules, expanded, target, at, amounts)
+
+
+def without(rules: Remeshing, pore: Pore, number: int, speed: float) -> Pore:
+    """The pore without an aggregate, by its place in the list, on a new mesh.
+
+    Water takes its place. Stored substrates keep their concentrations there. speed: as for
+    :func:`remesh`.
+    """
+    mesh = pore.mesh
+    topology = mesh.topology
+    kept = [k for k in range(len(pore.bodies)) if k != number]
+    if not kept:
+        clean, _ = rules.meshing.around([])
+        space = Space(clean)
+        return replace(pore, space=space, bodies=(), pressure=np.zeros(clean.corners), front=1.0,
+                       concentrations=_carried(rules, pore, pore, space, speed))
+    new_number = np.zeros(len(pore.bodies) + 1, int)
+    new_number[[k + 1 for k in kept]] = np.arange(1, len(kept) + 1)
+    loops = tuple(topology.loops[k] for k in kept)
+    left = Mesh.of(mesh.points, mesh.cells, new_number[topology.region], loops, mesh.walls,
+                   mesh.ends, topology.method)
+    pressure = np.where(np.isin(np.arange(mesh.corners), left.body), pore.pressure, 0.0)
+    bodies = tuple(pore.bodies[k] for k in kept)
+    rest = replace(pore, space=Space(left), bodies=bodies, pressure=pressure)
+    return remesh(rules, rest, rest, speed)[0]
+
+
+def _carried(rules: Remeshing, previous: Pore, expanded: Pore, new: Space,
+             speed: float) -> Concentrations | None:
+    """The substrates of an expanded pore on a new mesh; arguments as in :func:`remesh`."""
+    supplied = at_time(rules.substrates, expanded.time if speed else 0.0)
+    return transfer_substrates(supplied, previous.space, new, expanded.concentrations, speed)
 
 
 def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,

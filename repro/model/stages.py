@@ -71,6 +71,10 @@ class Stages:
         theta = growing.compute_theta(previous, grown, self.remeshing.maximum_density)
         return contact.expand(self.mechanics, grown, theta, guess, search)
 
+    def without(self, pore: Pore, number: int, solved: Solved) -> Pore:
+        """The pore without one of its aggregates, by :func:`remeshing.without`."""
+        return remeshing.without(self.remeshing, pore, number, solved.mean_velocity)
+
     def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved,
                  generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:
         """Give an expanded aggregate a mesh, by :func:`remeshing.new_mesh`."""

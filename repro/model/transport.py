@@ -567,8 +567,7 @@ def steady(problem: Problem, sink: Sink | None,
     not start again if the law is not monotone: several solutions may exist, and the one near the
     guess is required.
     """
-    if problem.law is None:
-        sink = None
+    sink = _acting(problem, sink)
     supply = problem.supply
     state = supply.copy() if guess is None else guess.fields.flatten()
     state[problem.system.constrained] = supply[problem.system.constrained]
@@ -700,7 +699,8 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
     out = both @ problem.outflow
     consumed = np.zeros(len(both))
     rows = np.zeros((2, 6))
-    if sink is not None and problem.law is not None:
+    sink = _acting(problem, sink)
+    if sink is not None:
         balance = Balance(problem, sink)
         consumed = balance.uptake(both.ravel()).sum(axis=(0, 2))
         rows[:, 5] = balance.unmet(both.ravel())
@@ -713,6 +713,12 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
     rows[problem.substrates.places, :5] = np.column_stack([supplied, out, consumed, enters, leaves])
     acceptor, donor = rows.tolist()
     return Fluxes(*acceptor), Fluxes(*donor)
+
+
+def _acting(problem: Problem, sink: Sink | None) -> Sink | None:
+    """The sink, None without kinetics or biomass."""
+    acts = sink is not None and problem.law is not None and sink.active.size > 0
+    return sink if acts else None
 
 
 def _end_means(end: End, both: np.ndarray, load: np.ndarray) -> np.ndarray:

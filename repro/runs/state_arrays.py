@@ -51,6 +51,7 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
              "ledgers": list(map(astuple, state.ledgers)),
              "origin_known": all(body.origin_known for body in pore.bodies),
              "seats": [astuple(body.seat) for body in pore.bodies],
+             "names": [body.name for body in pore.bodies],
              "compression": astuple(state.compression)}
     return plain, arrays
 
@@ -102,7 +103,7 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
 def _body(scene: Scene, space: Space, region: Region, plain: dict, arrays: Arrays) -> Body:
     solid = material(space, region, arrays["reference"], energy_of(scene.growth))
     configuration = configuration_of(scene.growth, arrays.get("last", solid.reference))
-    (seat,) = plain["seats"]
+    (seat,), (name,) = plain["seats"], plain["names"]
     return Body(solid=solid, configuration=configuration, origin_known=plain["origin_known"],
-                line_speeds=arrays.get("line_speeds"), seat=Seat(*seat),
+                line_speeds=arrays.get("line_speeds"), seat=Seat(*seat), name=name,
                 **{name: arrays[name] for name in OF_BODY})

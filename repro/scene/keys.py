@@ -323,6 +323,10 @@ class Growth:
         "0.01 MPa", "MPa", default=None, source="Section 5, without a value",
         about="The run ends if the largest tensile stress exceeds it, in the mean within "
               "pore.width / 20")
+    after_detachment: str = choice(
+        "end", "continue", source="Section 5, without a model",
+        about="An aggregate whose traction exceeds bonding_strength ends the run, or leaves the "
+              "pore if it touches one wall alone")
     new_biomass: str = choice(
         "stressed", "stress_free", source="2.3, section 5",
         about="Strain counts from t = 0 (2.3), or new biomass has no stress (section 5)")
@@ -337,6 +341,11 @@ class Growth:
     def bonded(self) -> bool:
         """Whether biomass keeps its place on the lower wall."""
         return self.wall == "bonded"
+
+    @property
+    def continues(self) -> bool:
+        """Whether an aggregate that detaches leaves the pore, and the run goes on."""
+        return self.after_detachment == "continue"
 
     @property
     def has_fluid_forces(self) -> bool:
