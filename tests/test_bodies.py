@@ -10,19 +10,22 @@ import numpy as np
 import pytest
 
 from repro.errors import MeshError
-from repro.fem import mesher, transfer
+from repro.fem import mesher, sizing, transfer
 from repro.fem.mesh import Mesh
-from repro.fem.outline import half_disc
+from repro.fem.outline import half_disc, polygon
 from repro.fem.space import Space
-from repro.march import folding, loop, updates
+from repro.fem.walls import BOTTOM, TOP, channel_walls
+from repro.march import balance, folding, loop, midpoint, updates
 from repro.march import stepping as midpoint_steps
+from repro.march.ends import Detachment, Meeting
 from repro.march.state import Compression, RestartState, contiguous
 from repro.march.step_control import StepControl
-from repro.model import adhesion, contact, growing, mesh_motion
+from repro.model import adhesion, contact, growing, mesh_motion, meshing
 from repro.model.adhesion import Loading
 from repro.model.biomass import Rates, grow, transfer_amounts
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import Seeding, seeded
+from repro.model.solving import Solver
 from repro.model.surface import surfaces
 from repro.scene import load_scene
 from tests.strategies import MIRRORS
@@ -159,6 +162,131 @@ def test_two_aggregates_grow_in_one_pore_and_balances_close(order, forces):
     areas = [outline.area for outline in last.outlines]
     assert areas == pytest.approx([body.mass / scene.kinetics.maximum_density for body in last.bodies], rel=0.02)
     assert sum(report.remeshes for report in reports) > 0
+
+
+def seeds_at(scene, *places):
+    """Half-discs of a scene, each with a radius (um), x (um) and number of its wall."""
+    walls = {wall.number: wall for wall in channel_walls(scene.pore.width)}
+    across = sizing.ACROSS_AGGREGATE * scene.numerics.refinement
+    return [half_disc(radius, across, scene.numerics.scheme.order, x, walls[number]) for radius, x, number in places]
+
+
+def started(scene, *places):
+    """The states of a run with half-discs."""
+    stepping = {True: midpoint_steps, False: updates}[scene.numerics.scheme.controls_error].STEPPING
+    pore = Seeding.of(scene).around(seeds_at(scene, *places))
+    bodies = tuple(replace(body, name=str(number)) for number, body in enumerate(pore.bodies, 1))
+    first = StepControl(stepping.first * scene.growth.time_step)
+    return loop.steps(scene, stepping, RestartState(contiguous(replace(pore, bodies=bodies)), first))
+
+
+@pytest.mark.parametrize("places", [
+    ((8.0, 0.0, BOTTOM), (5.0, 2.0, TOP)), ((8.0, -30.0, TOP), (5.0, 30.0, TOP)),
+    ((8.0, -40.0, BOTTOM), None, (6.0, 40.0, TOP)), ((6.0, -60.0, TOP), None, (8.0, 30.0, BOTTOM), None),
+    (None, None)], ids=lambda places: "".join({BOTTOM: "b", TOP: "t"}[each[2]] if each else "s" for each in places))
+@EVERY
+def test_water_is_meshed_around_aggregates_on_either_wall_and_between_those_on_both(order, places):
+    """None stands for an aggregate from wall to wall. Each region has the area of its outline, the fluid the rest."""
+    width = 30.0
+    scene = load_scene("base", [f"numerics.preset={dict(enumerate(('paper', 'fast'), 1))[order]}", "pore.width=30 um",
+                                "numerics.refinement=0.3"])
+    outlines = []
+    for number, place in enumerate(places):
+        if place:
+            outlines += seeds_at(scene, place)
+        else:
+            points = np.array([[-4.0, 0.0], [-6.0, width], [5.0, width], [3.0, 0.0]]) + [40.0 * number - 40.0, 0.0]
+            outlines.append(polygon(points, channel_walls(width), order))
+    outlines.reverse()  # the list need not be in the order along the pore
+    mesh, split = meshing.Meshing.of(scene).around(outlines)
+    assert [outline.seat for outline in split] == [outline.seat for outline in outlines]
+    dx = Space(mesh).at.dx.sum(axis=1)
+    areas = [dx[region.triangles].sum() for region in mesh.regions]
+    assert areas == pytest.approx([outline.area for outline in split], rel=1e-9)
+    assert dx.sum() == pytest.approx(width * np.ptp(mesh.ends), rel=1e-9)
+    assert sum(body is None for body in places) == sum(np.ptp(each.wall[each.wall > 0]) > 0 for each in split)
+
+
+@EVERY
+def test_a_film_between_two_aggregates_has_elements_as_small_as_one_at_a_wall(order):
+    """Between two half-discs that face each other lie ten elements per refinement, and none without the second."""
+    scene = load_scene("base", [f"numerics.preset={dict(enumerate(('paper', 'fast'), 1))[order]}", "pore.width=50 um",
+                                "numerics.refinement=0.5"])
+    facing = seeds_at(scene, (20.0, 0.0, BOTTOM), (20.0, 0.0, TOP))
+    (_, beside), _ = sizing.each_beside(facing, meshing.sized(scene))
+    film = sizing.film_sizes(facing[0].corners, beside)
+    top = int(np.argmax(facing[0].corners.points[:, 1]))
+    assert film[top] == pytest.approx(10.0 / 10 / 0.5, rel=1e-3)
+    assert facing[0].film(facing[1]) == (pytest.approx(10.0, rel=1e-3), pytest.approx([0.0, 25.0], abs=0.2))
+
+
+def test_each_aggregate_gets_the_growth_that_was_computed_for_it():
+    """The correction of one aggregate does not depend on the other one."""
+    scene, one = one_pore(2)
+    both, *_ = paired(one)
+    after, _ = grown(scene, both, 0.1)
+    produced = tuple((factor * float((new.active - old.active).sum()), factor * float((new.inert - old.inert).sum()))
+                     for factor, old, new in zip((1.01, 0.97), both.bodies, after.bodies))
+    matched = midpoint._match_production(both, after, produced)
+    for old, new, (active, inert) in zip(both.bodies, matched.bodies, produced):
+        assert (new.active - old.active).sum() == pytest.approx(active, rel=1e-9)
+        assert (new.inert - old.inert).sum() == pytest.approx(inert, rel=1e-9)
+
+
+@pytest.mark.parametrize("opposite", [TOP, BOTTOM])
+@EVERY
+def test_two_aggregates_that_meet_end_the_run_there(order, opposite):
+    """On opposite walls and on one wall. The end is located where the film is as thin as the least one."""
+    preset = {1: "paper", 2: "fast"}[order]
+    scene = load_scene("base", [f"numerics.preset={preset}", "numerics.refinement=0.4", "pore.width=40 um",
+                                'growth.end="40 h"', 'growth.minimum_film="4 um"', 'growth.time_step="0.5 h"'])
+    x = 0.0 if opposite == TOP else 30.0
+    seeds = (12.0, -x / 2, BOTTOM), (10.0, x / 2, opposite)
+    reports = []
+    with pytest.raises(Meeting, match=r"^aggregates 1 and 2 meet at t = .* below growth.minimum_film, 4 um"):
+        reports.extend(report for _, report in started(scene, *seeds) if report)
+    films = [report.pore.outlines[0].film(report.pore.outlines[1])[0] for report in reports]
+    assert len(films) > 1 and min(films[:-1]) > 4.0 and films[-1] == pytest.approx(4.0, rel=2e-4)
+
+
+@pytest.mark.parametrize("transport", ["quasi_steady", "gear"])
+@pytest.mark.parametrize("preset", ["paper", "fast"])
+def test_an_aggregate_that_detaches_leaves_the_pore_with_its_mass(preset, transport):
+    """The others stay as they were. Without any the pore is clean: its effluents are the supplies."""
+    if (preset, transport) == ("fast", "gear"):
+        pytest.skip("the scene is refused")
+    refinement = {"paper": 0.4, "fast": 0.15}[preset]
+    scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}", 'growth.end="4 h"',
+                                "growth.wall=bonded", 'growth.bonding_strength="4 kPa"', "output.every=1 h",
+                                "growth.after_detachment=continue", f"numerics.transport={transport}"])
+    reports = [report for _, report in started(scene, (5.0, -60.0, BOTTOM), (8.0, 60.0, TOP)) if report]
+    names = [[body.name for body in report.pore.bodies] for report in reports]
+    assert names[0] == ["1", "2"] and ["1"] in names and names[-1] == [] and ["2"] not in names
+    assert reports[-1].pore.time == 4.0
+    ledgers = [ledger for report in reports for ledger in report.ledgers]
+    left = [ledger for ledger in ledgers if ledger.detached]
+    assert len(left) == 2
+    for ledger in ledgers:
+        after = ledger.biomass_after + ledger.detached
+        assert after == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-9)
+    for ledger, following in zip(ledgers, ledgers[1:]):
+        assert following.biomass_before == pytest.approx(ledger.biomass_after, rel=1e-12)
+    clean = Solver.of(scene).solve_flow(Seeding.of(replace(scene, aggregate=None)).pore(1.0).space, scene.flow)
+    assert reports[-1].solved.flow.conductivity == pytest.approx(clean.conductivity, rel=1e-6)
+    supplies = [kind.supply for kind in (scene.substrates.acceptor, scene.substrates.donor)]
+    if transport == "quasi_steady":
+        assert [flux.effluent for flux in reports[-1].solved.fluxes] == pytest.approx(supplies, rel=1e-9)
+    assert balance.oxygen_demand(scene.kinetics, ledgers[-1]) == balance.biomass(ledgers[-1]) == 0.0
+
+
+def test_an_aggregate_on_both_walls_does_not_leave():
+    """A wall that gives way would set its surface free, and the model has no law for that: the run ends."""
+    scene = load_scene("base", ["numerics.preset=fast", "pore.width=20 um", 'growth.end="12 h"', "growth.wall=bonded",
+                                'growth.bonding_strength="12 kPa"', "growth.after_detachment=continue"])
+    reports = []
+    with pytest.raises(Detachment, match="^the aggregate detaches at t = "):
+        reports.extend(report for _, report in started(scene, (16.0, 0.0, BOTTOM)) if report)
+    assert reports[-1].pore.contact and len(reports[-1].pore.bodies) == 1
 
 
 @pytest.mark.parametrize("position, refused", [(15.0, True), (50.0, False)])

@@ -60,6 +60,19 @@ def test_a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh(order, on):
     assert radius == pytest.approx(np.full(len(radius), 20.0), rel=1e-3 if order == 2 else 1e-12)
 
 
+@WALLS
+def test_elements_beside_contact_are_small_at_the_wall_without_the_seed(on):
+    """The size at the lines of the opposite wall is that of the scene, and the wall of the seed has larger elements."""
+    walls = channel_walls(WIDTH)
+    points = np.array([[-14.0, 0.0], [-12.0, 25.0], [-11.0, WIDTH], [10.0, WIDTH], [13.0, 25.0], [16.0, 0.0]])
+    outline = replace(polygon(points, walls), seat=Seat(on.number))
+    sizes = sizing.interface_sizes(outline, Sizing(walls, 1.0, 2.0, contact=0.25))
+    ends = outline.contact_ends
+    for wall in walls:
+        least = sizes[ends & (outline.wall == wall.number)].min()
+        assert least > 1.0 if wall == on else least == 0.25
+
+
 @pytest.mark.parametrize("number", [1, 2])
 @EVERY_ORDER
 def test_water_slips_only_along_a_wall_that_lets_it(order, number):

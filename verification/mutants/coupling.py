@@ -5,6 +5,7 @@ from verification.mutants import changes
 CONTACT_TESTS = "tests/test_contact.py::test_"
 FOLD_TESTS = "tests/test_fold.py::test_"
 ENDS = "tests/test_ends.py::test_"
+BODIES = "tests/test_bodies.py::test_"
 SUPPORT_TESTS = "tests/test_support.py::test_"
 ROUNDS_TESTS = "tests/test_traction.py::test_rounds_"
 SMALLEST_CONTACT = f"{CONTACT_TESTS}the_contact_surface_is_the_smallest_that_leaves_enough_fluid"
@@ -17,6 +18,74 @@ MUTANTS = (
          "",
          "MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12",
          "MPA_PER_UM = 1e-6 / 3600**2 * 1e-12")),
+    *changes(
+        "repro/fem/walls.py",
+        ("bonded-to-the-opposite-wall",
+         "An aggregate that is bonded to the wall of its seed is bonded to the opposite wall, too.",
+         "Seat.walls",
+         "replace(wall, bonded=False)",
+         "wall",
+         "tests/test_walls.py::test_a_scene_bonds_each_aggregate_to_the_wall_of_its_seed_alone[bonded]")),
+    *changes(
+        "repro/fem/sizing.py",
+        ("film-between-aggregates-coarse",
+         "A film between two aggregates has elements as large as elsewhere.",
+         "film_sizes",
+         "[other.distances(outline.points) for other in sizing.others]",
+         "[]",
+         f"{BODIES}a_film_between_two_aggregates_has_elements_as_small_as_one_at_a_wall[2]"),
+        ("seat-always-below",
+         "Elements beside contact are small at the upper wall, also if the seed sat there.",
+         "_contact_sizes",
+         "outline.wall != outline.seat.wall",
+         "outline.wall != 1",
+         "tests/test_walls.py::test_elements_beside_contact_are_small_at_the_wall_without_the_seed[upper]")),
+    *changes(
+        "repro/fem/mesher.py",
+        ("aggregates-in-the-order-of-the-list",
+         "The water is meshed along a wall from aggregate to aggregate in the order of the list.",
+         "_Fluid._order",
+         "sorted(touching, key=lambda number: wall.normal * self._contact(number, wall)[0][0])",
+         "touching",
+         f"{BODIES}water_is_meshed_around_aggregates_on_either_wall_and_between_those_on_both[2-ss]")),
+    *changes(
+        "repro/march/ends.py",
+        ("meeting-when-they-touch",
+         "Two aggregates meet when the film between them is half of the least one.",
+         "_meetings",
+         "1 - film / least",
+         "1 - 2 * film / least",
+         f"{BODIES}two_aggregates_that_meet_end_the_run_there[1-2]"),
+        ("one-wall-of-two-lets-go",
+         "An aggregate on both walls leaves the pore if one of them gives way.",
+         "_events",
+         "None if body.spans else number",
+         "number",
+         f"{BODIES}an_aggregate_on_both_walls_does_not_leave")),
+    *changes(
+        "repro/march/loop.py",
+        ("detached-mass-is-lost",
+         "The mass of an aggregate that leaves the pore is in no ledger.",
+         "_after_detachment",
+         "step.ledger.detached + gone",
+         "step.ledger.detached",
+         f"{BODIES}an_aggregate_that_detaches_leaves_the_pore_with_its_mass[paper-quasi_steady]")),
+    *changes(
+        "repro/model/remeshing.py",
+        ("the-wrong-aggregate-leaves",
+         "The first aggregate of the list leaves the pore instead of the one that detaches.",
+         "without",
+         "[k for k in range(len(pore.bodies)) if k != number]",
+         "[k for k in range(len(pore.bodies)) if k != 0]",
+         f"{BODIES}an_aggregate_that_detaches_leaves_the_pore_with_its_mass[paper-quasi_steady]")),
+    *changes(
+        "repro/march/midpoint.py",
+        ("corrections-of-growth-exchanged",
+         "The correction of its growth goes to the other aggregate.",
+         "_match_production",
+         "zip(previous.bodies, after.bodies, produced)",
+         "zip(previous.bodies, after.bodies, produced[::-1])",
+         f"{BODIES}each_aggregate_gets_the_growth_that_was_computed_for_it")),
     *changes(
         "repro/model/support.py",
         ("support-uneven",
