@@ -41,14 +41,6 @@ MUTANTS = (
          "outline.wall != 1",
          "tests/test_walls.py::test_elements_beside_contact_are_small_at_the_wall_without_the_seed[upper]")),
     *changes(
-        "repro/fem/mesher.py",
-        ("aggregates-in-the-order-of-the-list",
-         "The water is meshed along a wall from aggregate to aggregate in the order of the list.",
-         "_Fluid._order",
-         "sorted(touching, key=lambda number: wall.normal * self._contact(number, wall)[0][0])",
-         "touching",
-         f"{BODIES}water_is_meshed_around_aggregates_on_either_wall_and_between_those_on_both[2-ss]")),
-    *changes(
         "repro/march/ends.py",
         ("meeting-when-they-touch",
          "Two aggregates meet when the film between them is half of the least one.",
