@@ -48,9 +48,41 @@ SIZE, AT_LINES = 0.3, 0.0005
 
 
 def geometry(outline: dict, size: float) -> OCCGeometry:
-    """Fluid and biomass. An edge of the outline is a parabola through its start, middle and end; edges on a wall are
-    one straight side. Points where an edge of the fluid meets a wall are contact lines."""
-    points, wall, width = np.array(outline["points"]), np.array(outline["wall"]), outline["width"]
+    """Fluid and biomass around one outline, in the part of the pore that lies around it."""
+    x = np.array(outline["points"])[:, 0]
+    reach = CLEAN * outline["width"]
+    return channel([outline], outline["width"], (x.min() - reach, x.max() + reach), size)
+
+
+def channel(outlines: list[dict], width: float, ends: tuple[float, float], size: float) -> OCCGeometry:
+    """Fluid and biomass between two ends (um). The points where the fluid meets biomass and a wall are contact lines.
+    """
+    low, high = ends
+    fluid = Rectangle(high - low, width).Face().Move((low, 0, 0))
+    bodies, lines = [], []
+    for number, outline in enumerate(outlines):
+        body, own_lines = aggregate(outline)
+        body.faces.name = f"biomass{number}"
+        fluid = fluid - body
+        bodies.append(body)
+        lines += own_lines
+    fluid.faces.name = "fluid"
+    parts = Glue([fluid, *bodies])
+    parts.faces.maxh = size * width
+    for vertex in parts.vertices:
+        if any(math.dist((vertex.p.x, vertex.p.y), line) < 1e-6 * width for line in lines):
+            vertex.maxh = AT_LINES * size / SIZE * width
+    for edge in parts.edges:
+        edge.name = {low: "inlet", high: "outlet"}.get(_at(edge, low, high), "inside")
+        if edge.name == "inside" and any(abs(edge.center.y - level) < 1e-9 * width for level in (0.0, width)):
+            edge.name = "wall"
+    return OCCGeometry(parts, dim=2)
+
+
+def aggregate(outline: dict) -> tuple[Face, list[np.ndarray]]:
+    """The face of an outline, and its contact lines. An edge is a parabola through its start, middle and end; edges on
+    a wall are one straight side."""
+    points, wall = np.array(outline["points"]), np.array(outline["wall"])
     starts, middles, ends = points[::2], points[1::2], np.roll(points[::2], -1, axis=0)
     on = wall[1::2]
     first = next(k for k in range(len(on)) if on[k] and not on[k - 1])
@@ -66,23 +98,7 @@ def geometry(outline: dict, size: float) -> OCCGeometry:
         else:
             edges.append(BezierCurve([_point(start), _point(2 * middle - (start + end) / 2), _point(end)]))
         k = last + 1
-    body = Face(Wire(edges))
-    body.faces.name = "biomass"
-    low, high = points[:, 0].min() - CLEAN * width, points[:, 0].max() + CLEAN * width
-    channel = Rectangle(high - low, width).Face().Move((low, 0, 0))
-    fluid = channel - body
-    fluid.faces.name = "fluid"
-    parts = Glue([fluid, body])
-    parts.faces.maxh = size * width
-    lines = [starts[k] for k in range(len(on)) if bool(on[k]) != bool(on[k - 1])]
-    for vertex in parts.vertices:
-        if any(math.dist((vertex.p.x, vertex.p.y), line) < 1e-6 * width for line in lines):
-            vertex.maxh = AT_LINES * size / SIZE * width
-    for edge in parts.edges:
-        edge.name = {low: "inlet", high: "outlet"}.get(_at(edge, low, high), "inside")
-        if edge.name == "inside" and any(abs(edge.center.y - level) < 1e-9 * width for level in (0.0, width)):
-            edge.name = "wall"
-    return OCCGeometry(parts, dim=2)
+    return Face(Wire(edges)), [starts[k] for k in range(len(on)) if bool(on[k]) != bool(on[k - 1])]
 
 
 def _at(edge, low: float, high: float) -> float:
@@ -101,18 +117,28 @@ def added_length(outline: dict, size: float, interface: str, ratio: float = RATI
     width = outline["width"]
     mesh = Mesh(geometry(outline, size).GenerateMesh(maxh=size * width, grading=0.25))
     mesh.Curve(ORDER)
+    speed, viscous, unknowns = stokes(mesh, width, interface, ratio)
+    loss = Integrate(InnerProduct(viscous, Grad(speed)), mesh) / width
+    x = np.array([place[0] for place in outline["points"]])
+    length = x.max() - x.min() + 2 * CLEAN * width
+    return loss * width**2 / 12 - length, unknowns
+
+
+def stokes(mesh: Mesh, width: float, interface: str,
+           ratio: float) -> tuple[GridFunction, CoefficientFunction, int]:
+    """Velocity with the mean 1 um/h, its viscous stress over the water's viscosity, and the number of unknowns."""
     velocity = VectorH1(mesh, order=ORDER, dirichletx="wall|inlet",
                         dirichlety="wall|inlet" + ("|outlet" if interface == "traction" else ""))
-    of_fluid, of_biomass = (H1(mesh, order=ORDER - 1, definedon=name) for name in ("fluid", "biomass"))
+    of_fluid, of_biomass = (H1(mesh, order=ORDER - 1, definedon=name) for name in ("fluid", "biomass.*"))
     space = velocity * of_fluid * of_biomass
     (u, p, r), (v, q, s) = space.TnT()
-    viscosity = CoefficientFunction([{"fluid": 1.0, "biomass": ratio}[name] for name in mesh.GetMaterials()])
+    viscosity = CoefficientFunction([1.0 if name == "fluid" else ratio for name in mesh.GetMaterials()])
     strain = Grad(u) + (Grad(u).trans if interface == "traction" else 0 * Grad(u))
     viscous = viscosity * InnerProduct(strain, Grad(v))
     form = BilinearForm(space, symmetric=True)
     form += viscous * dx
     form += (-p * div(v) - q * div(u)) * dx(definedon="fluid")
-    form += (-r * div(v) - s * div(u)) * dx(definedon="biomass")
+    form += (-r * div(v) - s * div(u)) * dx(definedon=mesh.Materials("biomass.*"))
     form.Assemble()
     solution = GridFunction(space)
     solution.components[0].Set(CoefficientFunction((6 * y / width * (1 - y / width), 0)),
@@ -123,10 +149,7 @@ def added_length(outline: dict, size: float, interface: str, ratio: float = RATI
     solution.vec.data -= form.mat.Inverse(free, inverse="umfpack") * load
     speed = solution.components[0]
     strain = Grad(speed) + (Grad(speed).trans if interface == "traction" else 0 * Grad(speed))
-    loss = Integrate(viscosity * InnerProduct(strain, Grad(speed)), mesh) / width
-    x = np.array([place[0] for place in outline["points"]])
-    length = x.max() - x.min() + 2 * CLEAN * width
-    return loss * width**2 / 12 - length, space.ndof
+    return speed, viscosity * strain, space.ndof
 
 
 def main() -> None:
