@@ -82,8 +82,9 @@ network: $(STAMP) $(NETWORK) ## run the example of a network with OpenPNM, and i
 	@$(dir $(NETWORK))bin/python docs/howto/openpnm_network.py
 	@$(dir $(NETWORK))bin/python -m pytest tests/test_openpnm.py
 
-gold: $(GOLD) ## compute the numbers of another code, NGSolve, anew: reference/gold/flow.json and growth.json
+gold: $(GOLD) ## compute the numbers of another code, NGSolve, anew: reference/gold/flow.json, pair.json and growth.json
 	@$(dir $(GOLD))bin/python reference/gold/flow.py
+	@$(dir $(GOLD))bin/python reference/gold/pair.py
 	@$(dir $(GOLD))bin/python reference/gold/growth.py
 
 docs: $(STAMP) $(SITE) ## build the site into docs/_build/html, without network

@@ -29,7 +29,7 @@ Functions; every argument after these is given by its name:
 
 Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
 ``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd``,
-``Fold`` and ``Detachment`` are ends of the model, which only ``simulate`` raises.
+``Fold``, ``Meeting`` and ``Detachment`` are ends of the model, which only ``simulate`` raises.
 
 Sections of the paper and their modules, which name the equations that they solve:
 
@@ -92,6 +92,7 @@ if TYPE_CHECKING:
     from repro.errors import OutputError as OutputError
     from repro.errors import SimulationError as SimulationError
     from repro.march.ends import Detachment as Detachment
+    from repro.march.ends import Meeting as Meeting
     from repro.march.ends import PoreEnd as PoreEnd
     from repro.march.folding import Fold as Fold
     from repro.march.simulation import simulate
@@ -109,7 +110,8 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported on first use: importing the solver takes half a
     #: second.
-    _MODULES = {"Detachment": "march.ends", "Fold": "march.folding", "OutputError": "errors",
+    _MODULES = {"Detachment": "march.ends", "Fold": "march.folding",
+                "Meeting": "march.ends", "OutputError": "errors",
                 "PoreEnd": "march.ends", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "network.resistance", "check": "preflight.checked",

@@ -142,7 +142,8 @@ class BalanceError(StageError):
 
 
 class RunEnd(Exception):
-    """The model ends before ``growth.end``, without a failure: Detachment, Fold or PoreEnd."""
+    """The model ends before ``growth.end``, without a failure: Detachment, Fold, Meeting or
+    PoreEnd."""
 
 
 class SimulationError(RuntimeError):
