@@ -142,8 +142,7 @@ class BalanceError(StageError):
 
 
 class RunEnd(Exception):
-    """The model ends before ``growth.end``, without a failure: Detachment, Fold, Meeting or
-    PoreEnd."""
+    """The model ends before ``growth.end``: Detachment, Fold, Meeting or PoreEnd. No failure."""
 
 
 class SimulationError(RuntimeError):

@@ -9,7 +9,7 @@ import json
 import pytest
 
 from verification.evidence.checks import at_most
-from verification.problems import family
+from verification.problems import family, siblings
 
 #: Processor time (s) of one run.
 LIMIT = 120.0
@@ -41,4 +41,27 @@ def test_pore(number, record):
     print(json.dumps(row))
     refused = {family.FAILED} if number in BUCKLED else {family.FAILED, family.UNCONFIRMED}
     failed = row["verdict"] in refused
+    record(at_most(f"{row['verdict']}: {row['status'][:300]}" if failed else "failures", failed, 0, "see the claim"))
+
+
+#: Cheap pores with several seeds, in ``make test``: one reaches its end, and in one two aggregates meet.
+QUICK_SIBLINGS = (0, 7)
+SIBLING = COMMON | {
+    "claim": "Practical pores with two to five seeds on both walls, some bonded, some under the forces of the water, "
+             "some whose aggregates may leave: each reaches its end, the pore's end, a meeting or a fold that an "
+             "independent stretch from its files confirms",
+    "norm": "pores that stop otherwise, or whose fold is not confirmed",
+    "omitted": "other presets: see coupling-facing"}
+
+
+@pytest.mark.parametrize("number", [
+    pytest.param(number, id=f"pore {number}", marks=marks)
+    for quick, marks in ((True, (pytest.mark.case("hard-siblings", **SIBLING),)),
+                         (False, (pytest.mark.case("hard-siblings-rest", **SIBLING), pytest.mark.slow)))
+    for number in range(siblings.SIBLINGS) if (number in QUICK_SIBLINGS) == quick])
+def test_sibling(number, record):
+    """Run a pore with several seeds. A failure shows its row of the record."""
+    row = siblings.run_sibling(siblings.draw_sibling(number))
+    print(json.dumps(row))
+    failed = row["verdict"] in (family.FAILED, family.UNCONFIRMED)
     record(at_most(f"{row['verdict']}: {row['status'][:300]}" if failed else "failures", failed, 0, "see the claim"))

@@ -12,8 +12,9 @@ import math
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
@@ -50,6 +51,8 @@ LEAST = re.compile(r"um at t = (\S+) h;")
 #: Verdicts of runs that end as the model does.
 ARRIVES, PORE_END = "end", "pore's end"
 FOLD = "fold"
+#: Words of the status of other ends, and their verdicts.
+OTHER_ENDS = {" meet at ": "meeting", " detaches at ": "detachment"}
 #: Verdicts that are errors.
 UNCONFIRMED, FAILED = "fold, not confirmed", "failed"
 
@@ -124,7 +127,12 @@ def run_member(member: Member, limit: float, *changes: str) -> dict:
 
     The row has the processor time of the run with its files ("cpu_s").
     """
-    scene = member.scene(*member.duration, *changes)
+    return {**vars(member), **run_scene(partial(member.scene, *changes), member.duration, limit)}
+
+
+def run_scene(scene_with: Callable[..., Scene], duration: list[str], limit: float) -> dict:
+    """Run a scene to the end that ``duration`` sets, and judge how it ends; scene_with: takes changes of the scene."""
+    scene = scene_with(*duration)
     start = process_time()
     with TemporaryDirectory() as temporary:
         folder = Path(temporary) / "run"
@@ -136,16 +144,16 @@ def run_member(member: Member, limit: float, *changes: str) -> dict:
                     cpu = process_time() - start
                 judged = judge(folder, status)
                 if judged["verdict"] == UNCONFIRMED:
-                    judged = judge(_run_until_least(member, folder, status, changes), status)
+                    judged = judge(_run_until_least(scene_with, folder, status), status)
         except (SimulationError, TooLong) as error:
             judged = {"verdict": FAILED, "status": str(error)}
-        return {**vars(member), "end_h": scene.growth.end, "cpu_s": round(cpu, 2), **judged, **_course(folder)}
+        return {"end_h": scene.growth.end, "cpu_s": round(cpu, 2), **judged, **_course(folder)}
 
 
-def _run_until_least(member: Member, folder: Path, status: str, changes: Iterable[str]) -> Path:
-    """Run a member to the time of its least stretch, and return the folder. Later buckles raise the stretch."""
+def _run_until_least(scene_with: Callable[..., Scene], folder: Path, status: str) -> Path:
+    """Run a scene to the time of its least stretch, and return the folder. Later buckles raise the stretch."""
     creased = folder.with_name("creased")
-    run(member.scene(f'growth.end="{LEAST.search(status)[1]} h"', *changes), creased)
+    run(scene_with(f'growth.end="{LEAST.search(status)[1]} h"'), creased)
     return creased
 
 
@@ -156,7 +164,8 @@ def judge(folder: Path, status: str) -> dict:
     least one row the mean over an edge is below CREASING.
     """
     if "folds" not in status:
-        return {"verdict": ARRIVES if status == COMPLETED else PORE_END, "status": status}
+        other = next((end for words, end in OTHER_ENDS.items() if words in status), PORE_END)
+        return {"verdict": ARRIVES if status == COMPLETED else other, "status": status}
     stretches = independent_stretches(folder)
     column = read_table(folder / "timeseries.csv")["surface_stretch_min"]
     mean, middle = stretches.min(axis=0).tolist()
@@ -182,10 +191,14 @@ def independent_stretches(folder: Path) -> np.ndarray:
 
 
 def _independent_stretch(grid) -> np.ndarray:
+    """The least stretches of all aggregates of a file; the region of a cell is the number of its aggregate."""
     before = np.nan_to_num(grid.point_data["position_t0_um"][:, :2])
-    stretch, distance, _ = surface_stretch.surface_stretch(
-        grid.points[:, :2], grid.cells, grid.cell_data["region"] == 1, before)
-    return surface_stretch.least(stretch, distance, BESIDE)
+    region = grid.cell_data["region"]
+    least = []
+    for number in np.unique(region[region > 0]):
+        stretch, distance, _ = surface_stretch.surface_stretch(grid.points[:, :2], grid.cells, region == number, before)
+        least.append(surface_stretch.least(stretch, distance, BESIDE))
+    return np.min(least, axis=0)
 
 
 def read_record() -> dict[int, dict]:

@@ -1,0 +1,81 @@
+"""Pores with two to five seeds, drawn by number like the pores of :mod:`verification.problems.family`.
+
+    python -m verification.problems.siblings 17 18     # these pores; all of them without numbers
+
+A quarter of them are bonded and let an aggregate go that detaches. Another quarter has the forces of the water, too.
+"""
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from repro.scene import Scene, load_scene
+from verification.problems import family
+
+SEED, SIBLINGS = 46, 60
+#: Processor time (s) of one run.
+LIMIT = 150.0
+#: Radius of a seed, its place and the gap between two seeds, over the width.
+RADII, PLACES, GAP = (0.06, 0.2), (-3.0, 3.0), 0.15
+LETS_GO = ('growth.bonding_strength="6 kPa"', "growth.after_detachment=continue")
+#: Changes of a quarter of the pores each.
+KINDS = ((), ("growth.wall=bonded", *LETS_GO), ("growth.fluid_forces=included", *LETS_GO), ())
+
+
+@dataclass(frozen=True)
+class Sibling:
+    """A pore: its number, width (um), supply of both substrates (mg/L), drive, and changes of its kind.
+
+    seeds: radius and place (um) of each, and its wall.
+    """
+
+    number: int
+    width: float
+    supply: float
+    drive: str
+    seeds: tuple[tuple[float, float, str], ...]
+    kind: tuple[str, ...]
+
+    @cached_property
+    def member(self) -> family.Member:
+        """The pore with its largest seed alone, which sets the end of the run."""
+        return family.Member(self.number, self.width, max(radius for radius, *_ in self.seeds), self.supply, self.drive)
+
+    def scene(self, *changes: str) -> Scene:
+        """The scene with changes."""
+        seeds = ", ".join(f'{{radius="{radius:.5g} um", position="{x:.5g} um", wall="{wall}"}}'
+                          for radius, x, wall in self.seeds)
+        sets = [change for change in self.member.sets if not change.startswith("aggregate.")]
+        return load_scene("wide", [*sets, f"aggregate=[{seeds}]", *self.kind, *changes],
+                          unset=["flow.mean_velocity"] if self.drive == "head" else [])
+
+
+def draw_sibling(number: int) -> Sibling:
+    """The pore with a number. It does not depend on the other ones."""
+    draw = np.random.default_rng([SEED, number])
+    width = 25 * 8 ** draw.uniform()
+    supply = 0.28 * (100 / 0.28) ** draw.uniform()
+    drive = family.DRIVES[draw.integers(3)]
+    count, seeds = int(draw.integers(2, 6)), []
+    while len(seeds) < count:
+        radius, x = width * draw.uniform(*RADII), width * draw.uniform(*PLACES)
+        wall = ("lower", "upper")[draw.integers(2)]
+        if all(math.hypot(x - place, 0 if wall == beside else width) > radius + other + GAP * width
+               for other, place, beside in seeds):
+            seeds.append((radius, x, wall))
+    return Sibling(number, width, supply, drive, tuple(seeds), KINDS[draw.integers(4)])
+
+
+def run_sibling(sibling: Sibling) -> dict:
+    """Run a pore, and judge its end."""
+    row = family.run_scene(sibling.scene, sibling.member.duration, LIMIT)
+    return {"number": sibling.number, "seeds": len(sibling.seeds), "kind": " ".join(sibling.kind), **row}
+
+
+if __name__ == "__main__":
+    for each in map(int, sys.argv[1:]) if sys.argv[1:] else range(SIBLINGS):
+        print(json.dumps(run_sibling(draw_sibling(each))), flush=True)
