@@ -56,8 +56,8 @@ def later(scene, reach=None):
         return None
     end, width = scene.growth.end, scene.pore.width
     if end >= 24:
-        return Sizes(end, 3 * width**2, width, reach or 1.5 * width, True)
-    return Sizes(end, 32 * np.pi, 8.0, 8.0, False)
+        return Sizes(end, 3 * width**2, width, reach or 1.5 * width, True, 2 * (reach or 1.5 * width))
+    return Sizes(end, 32 * np.pi, 8.0, 8.0, False, 16.0)
 
 
 def warned(scene, reach=None):

@@ -23,7 +23,7 @@ from repro.model.closing_by_nodes import closing_nodes
 from repro.model.configuration import FromPrevious
 from repro.model.contact_lines import PATIENT, Clearance, Contact, surface_ends
 from repro.model.mechanics import Mechanics
-from repro.model.meshing import initial_outline, seeded
+from repro.model.meshing import initial_outlines, seeded
 from repro.runs.execution import Watch, resume, run
 from repro.runs.state_arrays import pack_state, unpack_state
 from repro.scene import load_scene
@@ -490,7 +490,7 @@ def test_each_contact_surface_has_its_own_fixed_point(order):
 
 def test_contact_lines_do_not_depend_on_the_first_node():
     """If the numbers of the ring's nodes are shifted, the same positions result."""
-    outline = initial_outline(load_scene("base"))
+    (outline,) = initial_outlines(load_scene("base"))
     expected = set(surface_ends(outline, BOTTOM))
     assert {step for _, step in expected} == {-1, 1} and len(expected) == 2
     for shift in range(1, len(outline.wall)):

@@ -362,8 +362,9 @@ def derived_adhesion(scene, instant):
     largest = np.linalg.eigvalsh(means.reshape(-1, 3, 3))[:, -1]
     x, y = of_body[near][largest.argmax()]
     loads = water_loads(scene, instant)[mesh.body]
-    on = of_body[of_body[:, 1] == 0.0, 0]
-    arm = of_body - [(on.min() + on.max()) / 2, 0.0]
+    seat = mesh.width if pore.body.reference[:, 1].min() > 0 else 0.0
+    on = of_body[of_body[:, 1] == seat, 0]
+    arm = of_body - [(on.min() + on.max()) / 2, seat]
     force = loads.sum(axis=0)
     return {"tensile_stress_max_MPa": largest.max(), "tensile_stress_max_x_um": x, "tensile_stress_max_y_um": y,
             "fluid_force_x_uN_per_m": 1e6 * force[0], "fluid_force_y_uN_per_m": 1e6 * force[1],

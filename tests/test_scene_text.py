@@ -13,7 +13,8 @@ from repro.scene.text import scene_text
 #: Keys that exclude another one that is set: they stay commented out.
 OTHER_DRIVE = {"head", "mean_velocity"}
 #: Keys without a default: the text has an example.
-EXAMPLES = {"times", "every", "outline", "donor_oxygen_demand", "permeability", "bonding_strength", "tensile_strength"}
+EXAMPLES = {"times", "every", "outline", "name", "donor_oxygen_demand", "permeability", "bonding_strength",
+            "tensile_strength"}
 
 
 def fields(kind, above=""):

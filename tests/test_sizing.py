@@ -9,10 +9,10 @@ from hypothesis import given
 from repro.fem import sizing as of
 from repro.fem.outline import Outline, polygon
 from repro.fem.sizing import Sizing
-from repro.fem.walls import BOTTOM, FREE, TOP, Seat, channel_walls
+from repro.fem.walls import BOTTOM, TOP, FREE, TOP, Seat, channel_walls
 from repro.model import meshing
 from repro.model.contact_lines import surface_ends
-from repro.model.meshing import initial_outline, resolution
+from repro.model.meshing import initial_outlines, resolution
 from repro.scene import Numerics, load_scene
 from tests import oracles
 from tests.strategies import attached_aggregates, lengths, outlines, refinements, widths
@@ -69,11 +69,12 @@ def test_the_mesher_gets_the_sizes_of_the_scene():
     changes = ["numerics.preset=paper", "pore.width=80 um", "numerics.refinement=0.7", "growth.minimum_film=0.5 um",
             "numerics.gradation=0.2", "numerics.contact_elements=4"]
     outline = json.dumps([["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]])
-    for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
+    for seed, seat in (('position="3 um"', Seat(BOTTOM, 3.0)), ('wall="upper"', Seat(TOP, 0.0)),
+                       (f"outline={outline}", Seat(BOTTOM))):
         scene = load_scene("base", [*changes, f"aggregate={{{seed}}}"])
         sizes = replace(meshing.sized(scene), front=2.0)
         assert sizes == Sizing(channel_walls(80.0), 0.7, 0.5, 0.2, 2.0, 0.125, 0.7)
-        assert initial_outline(scene).seat == Seat(BOTTOM, middle)
+        assert [each.seat for each in initial_outlines(scene)] == [seat]
 
 
 @pytest.mark.parametrize("key, unit", [("mean_velocity", "m/day"), ("head", "um")])

@@ -129,6 +129,11 @@ class Outline:
         edges = self.arcs(np.arange(len(self.points)))[self.edge_wall == wall]
         return edges[:, :: 3 - self.geometry].astype(int)
 
+    def contact_length(self, wall: Wall) -> float:
+        """Length (um) of its contact surface with a wall."""
+        ends = self.points[self.edges_on(wall.number)[:, [0, -1]], 0]
+        return float(np.abs(ends[:, 1] - ends[:, 0]).sum())
+
     @property
     def contact_ends(self) -> np.ndarray:
         """(M,) True at the ends of the contact surfaces."""
@@ -233,15 +238,25 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
 
 def polygon(corners: np.ndarray, walls: Walls, geometry: int = 1, smooth: bool = False,
             at_tips: float = inf, bends: bool = False) -> Outline:
-    """The outline of an aggregate through points (K, 2) um, from lower wall to lower wall.
+    """The outline of an aggregate through points (K, 2) um, from the first wall to the first wall.
 
-    The points go from the upstream to the downstream end; those on the upper wall are contact.
+    The points go from the upstream to the downstream end; those on the second wall are contact.
     smooth: a natural cubic spline replaces the straight line between two points unless both are
     contact. at_tips: length (um) of the edges at tips; edges grow away from tips. bends: the flow
     bends the aggregate about its contact lines, which then count as tips. The middle of each
     contact surface is its fixed point, if its wall keeps one. Raises OutsidePore where the curve
     leaves the pore.
     """
+    first, *_ = walls
+    if first.normal < 0:
+        level = sum(wall.y for wall in walls)
+        below = [replace(wall, y=level - wall.y, normal=-wall.normal) for wall in walls]
+        drawn = polygon(_upside_down(corners, level), tuple(below), geometry, smooth, at_tips,
+                        bends)
+        back = -np.arange(len(drawn.points))
+        points = _upside_down(drawn.points, level)[back]
+        return Outline(points, drawn.wall[back], drawn.fixed[back], points.copy(), geometry,
+                       drawn.seat)
     # Counterclockwise: from the downstream end over the top to the upstream end.
     rim = np.asarray(corners, float)[::-1]
     if smooth:
@@ -257,7 +272,12 @@ def polygon(corners: np.ndarray, walls: Walls, geometry: int = 1, smooth: bool =
     fixed = _middles(points, walls)
     if geometry == 2:
         points, wall_numbers, fixed = _with_arc_middles(points, wall_numbers, fixed)
-    return Outline(points, wall_numbers, fixed, points.copy(), geometry)
+    return Outline(points, wall_numbers, fixed, points.copy(), geometry, Seat(first.number))
+
+
+def _upside_down(points: np.ndarray, level: float) -> np.ndarray:
+    """Points (K, 2) um mirrored at half of a level (um)."""
+    return np.asarray(points, float) * [1.0, -1.0] + [0.0, level]
 
 
 #: Corners that turn by more than this angle have smaller edges beside them.

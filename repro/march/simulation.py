@@ -14,7 +14,7 @@ from repro.march.state import Report, RestartState, contiguous, initial_report, 
 from repro.march.step_control import STRETCH, StepControl
 from repro.model.grading import solve_graded
 from repro.model.meshing import seeded
-from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
+from repro.scene import Scene, SceneError, Source, load_scene, parse_scene, scene_tables
 from repro.scene.arguments import typed
 from repro.schemes import Scheme
 
@@ -47,7 +47,7 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
         Another scheme than that of the preset, such as ``replace(PAPER, carrier="u")``.
     shape : (K, 2) sequence of float, optional
         Boundary of the aggregate at t = 0, points (x, y) in um from the upstream to the downstream
-        end on the lower wall. It replaces the shape of the scene (see ``aggregate.outline``).
+        end on its wall. It replaces the shape of the only aggregate (see ``aggregate.outline``).
     state : RestartState, optional
         State of :func:`steps` after which the simulation continues; t = 0 by default.
 
@@ -97,6 +97,9 @@ def _reports(states: Iterator[tuple[RestartState, Report | None]]) -> Iterator[R
 def shaped(scene: Scene, shape: Shape) -> Scene:
     """Replace the boundary of the aggregate at t = 0, and check the scene like a scene file."""
     tables = scene_tables(scene)
+    if len(scene.aggregates) > 1:
+        raise SceneError(f"{scene.name} with a shape: one aggregate at most is needed, and the "
+                         f"scene has {', '.join(scene.places)}")
     seed = dict(tables.get("aggregate", {}))
     for key in ("radius", "position"):
         seed.pop(key, None)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from repro.errors import Unresolved
 from repro.model.meshing import Seeding
 from repro.model.pore import Pore
@@ -56,11 +58,19 @@ class Grading:
         front = 2 * pore.front
         if not self.solver.scheme.follows_layers or front > MOST_GRADED:
             return None
-        if pore.time == 0:
+        if pore.time == 0 and self._as_seeded(pore):
             return self.seeding.pore(front)
+        if pore.time == 0 and self.remeshing is None:
+            return self.seeding.around(pore.outlines, front)
         from repro.model.remeshing import remesh
         rules = needed(self.remeshing, "[growth]")
         return remesh(rules, pore, replace(pore, front=front), 0.0)[0]
+
+    def _as_seeded(self, pore: Pore) -> bool:
+        """Does a pore have the seeds of the scene, and has nothing moved them? It may instead have
+        outlines of its own, or a shape under the forces of the water."""
+        seeds = self.seeding.pore(pore.front).mesh.points
+        return np.array_equal(seeds, pore.mesh.points)
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 from math import inf
 from typing import overload
 
@@ -16,7 +17,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import Walls, channel_walls, whole_width
+from repro.fem.walls import Wall, Walls, channel_walls, whole_width
 from repro.model.body import Body
 from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
@@ -53,6 +54,11 @@ def walls_of(scene: Scene) -> Walls:
     return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
 
 
+def seat_of(seed: Aggregate, walls: Walls) -> Wall:
+    """The wall on which a seed sits."""
+    return walls[("lower", "upper").index(seed.wall)]
+
+
 def whole_width_of(scene: Scene) -> float:
     """W of a scene's pore (um), with the mirror image beyond a plane of symmetry."""
     return whole_width(walls_of(scene))
@@ -64,8 +70,8 @@ def film(scene: Scene) -> float:
 
 
 def least_gap(scene: Scene) -> float:
-    """Distance (um) of the aggregate from the opposite wall at which the film there closes."""
-    _, opposite = walls_of(scene)
+    """Distance (um) of an aggregate from the opposite wall at which the film there closes."""
+    _, opposite = walls_of(scene)  # no aggregate sits on a plane of symmetry
     return film(scene) * opposite.part
 
 
@@ -183,13 +189,17 @@ class Meshing:
         """Generate a mesh around aggregates, by :func:`repro.fem.mesher.generate_around`, with the
         extent of 3.1; also return the outlines with their nodes on that mesh."""
         numerics = self.numerics
-        width = self.sizes.whole_width
-        extents = [sizing.meshed_extent(outline, width, self.channel.length, numerics.whole_pore)
+        sizes = replace(self.sizes, front=front)
+        return mesher.generate_around(outlines, self.extent(outlines), sizes,
+                                      numerics.scheme.order, Method(numerics.solver))
+
+    def extent(self, outlines: Sequence[Outline]) -> tuple[float, float]:
+        """Ends (um) of a mesh around aggregates (3.1)."""
+        extents = [sizing.meshed_extent(outline, self.sizes.whole_width, self.channel.length,
+                                        self.numerics.whole_pore)
                    for outline in outlines or (None,)]
         firsts, lasts = zip(*extents)
-        sizes = replace(self.sizes, front=front)
-        return mesher.generate_around(outlines, (min(firsts), max(lasts)), sizes,
-                                      numerics.scheme.order, Method(numerics.solver))
+        return min(firsts), max(lasts)
 
 
 def size_at_tips(numerics: Numerics, width: float) -> float:
@@ -202,12 +212,14 @@ def size_at_tips(numerics: Numerics, width: float) -> float:
 class Seeding:
     """Data from which the pore at t = 0 is made.
 
-    seed: section [aggregate], None in a clean channel; maximum_density: X_m, mg/L, zero without
-    kinetics; growth: section [growth], None if nothing grows.
+    seeds: sections [aggregate], none in a clean channel; names: of these aggregates;
+    maximum_density: X_m, mg/L, zero without kinetics; growth: section [growth], None if nothing
+    grows.
     """
 
     meshing: Meshing
-    seed: Aggregate | None
+    seeds: tuple[Aggregate, ...]
+    names: list[str]
     maximum_density: float
     growth: Growth | None
 
@@ -215,48 +227,58 @@ class Seeding:
     def of(cls, scene: Scene) -> Seeding:
         """The seeding of a scene."""
         density = scene.kinetics.maximum_density if scene.kinetics else 0.0
-        return cls(Meshing.of(scene), scene.aggregate, density, scene.growth)
+        return cls(Meshing.of(scene), scene.aggregates, scene.labels, density, scene.growth)
 
-    def outline(self, front: float) -> Outline | None:
-        """The aggregate's boundary, None in a clean channel; front: as :attr:`Pore.front`."""
-        seed = self.seed
-        if seed is None:
-            return None
+    def outlines(self, front: float = 1.0) -> list[Outline]:
+        """The boundaries of the aggregates; front: as :attr:`Pore.front`."""
+        return [self._outline(seed, front) for seed in self.seeds]
+
+    def _outline(self, seed: Aggregate, front: float) -> Outline:
+        """The boundary of one aggregate."""
         numerics = self.meshing.numerics
         sizes = self.meshing.sizes
         geometry = numerics.scheme.order
+        wall = seat_of(seed, sizes.walls)
         if seed.radius is None:
-            return polygon(np.array(seed.outline), sizes.walls, geometry, seed.smooth,
+            facing = sorted(sizes.walls, key=lambda other: other is not wall)
+            points = np.array(seed.outline) + [seed.position, 0.0]
+            return polygon(points, tuple(facing), geometry, seed.smooth,
                            size_at_tips(numerics, self.meshing.channel.width),
                            bends=interface_of(numerics.interface).bends)
         across = sizing.ACROSS_AGGREGATE * sizes.refinement * front
-        return half_disc(seed.radius, across, geometry, seed.position)
+        return half_disc(seed.radius, across, geometry, seed.position, wall)
 
     def pore(self, front: float, outline: Outline | None = None) -> Pore:
         """The pore at t = 0, as :func:`seeded` makes it."""
-        outline = outline or self.outline(front)
-        return self.around([] if outline is None else [outline], front)
+        return self.around([outline] if outline else self.outlines(front), front)
 
     def around(self, outlines: Sequence[Outline], front: float = 1.0) -> Pore:
-        """The pore at t = 0 with aggregates in outlines."""
+        """The pore at t = 0 with aggregates in outlines; the seeds give the composition of each in
+        turn. If they are not as many, numbers are the names."""
         mesh, outlines = self.meshing.around(outlines, front)
         space = Space(mesh)
-        bodies = [self._body(space, *each) for each in zip(mesh.regions, outlines)]
+        fractions = cycle([seed.inert_fraction for seed in self.seeds] or [0.0])
+        own = len(outlines) == len(self.seeds)
+        names = self.names if own else [str(k + 1) for k in range(len(outlines))]
+        bodies = [self._body(space, *each)
+                  for each in zip(mesh.regions, outlines, fractions, names)]
         return Pore(0.0, space, tuple(bodies), np.zeros(mesh.corners), front=front)
 
-    def _body(self, space: Space, region: Region, outline: Outline) -> Body:
-        """The aggregate of a region."""
+    def _body(self, space: Space, region: Region, outline: Outline, fraction: float,
+              name: str) -> Body:
+        """The aggregate of a region, with a fraction of inert biomass and a name."""
         total = self.maximum_density * space.reaction.dx[space.integration.rows(region)]
-        inert = total * (self.seed.inert_fraction if self.seed else 0.0)
+        inert = total * fraction
         solid = material(space, region, space.mesh.points[region.nodes], energy_of(self.growth))
         theta = np.ones((len(region.triangles), len(solid.shape.table.weights)))
         return Body(outline.wall, outline.fixed, total - inert, inert, theta, solid,
-                    configuration_of(self.growth, solid.reference), seat=outline.seat)
+                    configuration_of(self.growth, solid.reference), seat=outline.seat,
+                    name=name)
 
 
-def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
-    """The aggregate's boundary at t = 0, None in a clean channel; front: as :attr:`Pore.front`."""
-    return Seeding.of(scene).outline(front)
+def initial_outlines(scene: Scene) -> list[Outline]:
+    """The boundaries of the aggregates at t = 0."""
+    return Seeding.of(scene).outlines()
 
 
 def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> Pore:
@@ -268,7 +290,7 @@ def seeded(scene: Scene, front: float = 1.0, outline: Outline | None = None) -> 
     front : float
         As :attr:`Pore.front`.
     outline : Outline, optional
-        Replaces the scene's outline.
+        Replaces the scene's outlines.
 
     Returns
     -------

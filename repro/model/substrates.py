@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from repro.model import transport
 from repro.model.flow import Flow
 from repro.model.kinetics import Sink
@@ -28,3 +30,13 @@ def solve(supplied: Substrates, kinetics: Kinetics | None, scheme: Scheme,
     sink = Sink(pore.active, over) if kinetics else None
     state = transport_in_time.settled(problem, sink, pore.concentrations)
     return problem, state, transport.fluxes(problem, sink, state)
+
+
+def uptakes(problem: Problem, pore: Pore, state: Concentrations) -> np.ndarray:
+    """(bodies, 2) um2 mg/L/h, uptake of acceptor and donor by each aggregate."""
+    at_points = transport.Balance(problem, Sink(pore.active)).uptake(state.fields.ravel())
+    by_body = np.zeros((len(pore.bodies), 2))
+    for number, region in enumerate(pore.mesh.regions):
+        own = pore.of(region, at_points).sum(axis=(0, 2))
+        by_body[number, problem.substrates.places] = own
+    return by_body

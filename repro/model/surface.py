@@ -76,6 +76,11 @@ def surface(pore: Pore) -> Surface:
     return surfaces(pore)[pore.number]
 
 
+def least_stretched(pore: Pore) -> Surface:
+    """The free surface with the least stretch."""
+    return min(surfaces(pore), key=lambda surface: surface.least)
+
+
 def _surface(mesh: Mesh, body: Body, region: Region, outline: Outline) -> Surface:
     """The free surface of an aggregate."""
     cells, local = region.beside_loop

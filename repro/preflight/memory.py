@@ -17,6 +17,8 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
+from itertools import chain, combinations
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +30,14 @@ from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, SPLIT
 from repro.model.advice import with_advice
 from repro.model.meshing import (
-    initial_outline,
+    initial_outlines,
     resolution,
     sized,
     thin_layers,
     whole_width_of,
 )
-from repro.scene import Scene, SceneError, needed
+from repro.scene import Aggregate, Scene, SceneError
+from repro.scene.rules import FINEST
 
 #: Bytes per node at the peak of a run, measured at 800 to 50 000 nodes.
 PER_NODE = 25e3
@@ -62,21 +65,25 @@ def expected_nodes(scene: Scene) -> float:
 
 
 def first_nodes(scene: Scene) -> float:
-    """Estimated nodes of the mesh at t = 0: around a half-disc or an outline, or of a channel."""
-    if scene.aggregate is None:
-        return _nodes(scene, 0.0, 3 * whole_width_of(scene), [])
-    radius = scene.aggregate.radius
-    if radius is not None:
-        return _half_disc_nodes(scene, radius, radius)
-    outline = needed(initial_outline(scene), "an aggregate")
-    extent = outline.downstream - outline.upstream
-    return _nodes(scene, outline.thickness, extent, _edges(outline.corners, sized(scene)))
+    """Estimated nodes of the mesh at t = 0: around half-discs and outlines, or of a channel."""
+    if not scene.aggregates:
+        return _nodes(scene, 3 * whole_width_of(scene), [])
+    firsts, lasts, surface = zip(*map(partial(_around, scene), scene.aggregates,
+                                      initial_outlines(scene)))
+    return _nodes(scene, max(lasts) - min(firsts), list(chain(*surface)))
 
 
-def _half_disc_nodes(scene: Scene, thickness: float, reach: float) -> float:
-    """Nodes of a mesh around an aggregate with a thickness and a half length (um)."""
-    size = thickness / ACROSS_AGGREGATE / resolution(scene)
-    return _nodes(scene, thickness, 2 * reach, [(size, math.pi * min(thickness, reach))])
+def _around(scene: Scene, seed: Aggregate,
+            outline: Outline) -> tuple[float, float, list[tuple[float, float]]]:
+    """Ends (um) of a mesh around a seed, if the pore were endless; element size and length (um) of
+    each piece of its surface."""
+    margin = min(10 * seed.height(scene.pore.width), 1.5 * whole_width_of(scene))
+    if seed.radius is None:
+        pieces = _edges(outline.corners, sized(scene))
+        return outline.upstream - margin, outline.downstream + margin, pieces
+    size = seed.radius / ACROSS_AGGREGATE / resolution(scene)
+    reach = seed.radius + margin
+    return seed.position - reach, seed.position + reach, [(size, math.pi * seed.radius)]
 
 
 def _edges(outline: Outline, sizes: sizing.Sizing) -> list[tuple[float, float]]:
@@ -91,16 +98,14 @@ def _edges(outline: Outline, sizes: sizing.Sizing) -> list[tuple[float, float]]:
     return [*zip(near[on_interface], pieces.edge_lengths()[on_interface])]
 
 
-def _nodes(scene: Scene, thickness: float, extent: float,
-           surface: list[tuple[float, float]]) -> float:
-    """Nodes of a mesh around an aggregate with a thickness and a length (um).
+def _nodes(scene: Scene, extent: float, surface: list[tuple[float, float]]) -> float:
+    """Nodes of a mesh with a length (um).
 
-    surface: element size and length (um) of each piece of its surface.
+    surface: element size and length (um) of each piece of the aggregates' surface.
     """
     pore = scene.pore
     numerics = scene.numerics
-    margin = min(10 * thickness, 1.5 * whole_width_of(scene))
-    length = pore.length if numerics.whole_pore else min(pore.length, extent + 2 * margin)
+    length = pore.length if numerics.whole_pore else min(pore.length, extent)
     largest = pore.width / ACROSS_PORE / resolution(scene)
     if numerics.gradation == 0:
         largest = min([largest, *(size for size, _ in surface)])
@@ -128,17 +133,23 @@ def expected_bytes(scene: Scene, growth: float | None = None) -> float:
 
 def require_outline(scene: Scene) -> None:
     """Raise SceneError if no mesh resolves the boundary layers, or if the curve through the points
-    of an outline crosses itself or leaves the pore; rules of the scene check the points."""
+    of an outline crosses itself, leaves the pore or comes close to another aggregate; rules of the
+    scene check the points."""
     try:
         resolution(scene)
-        outline = initial_outline(scene)
-        curve = None if outline is None else shapely.Polygon(outline.corners.points)
+        curves = {place: shapely.Polygon(outline.corners.points)
+                  for place, outline in zip(scene.places, initial_outlines(scene))}
     except MeshError as error:
         raise SceneError(f"{scene.name}: {with_advice(error)}") from error
-    if curve is not None and not curve.is_valid:
-        location = shapely.is_valid_reason(curve)
-        raise SceneError(f"{scene.name}: the spline through the points of aggregate.outline "
-                         f"crosses itself ({location}); try smooth = false")
+    for place, curve in curves.items():
+        if not curve.is_valid:
+            location = shapely.is_valid_reason(curve)
+            raise SceneError(f"{scene.name}: the spline through the points of {place}.outline "
+                             f"crosses itself ({location}); try smooth = false")
+    for one, other in combinations(curves, 2):
+        if curves[one].distance(curves[other]) < FINEST * scene.pore.width:
+            raise SceneError(f"{scene.name}: the splines of {one} and {other} overlap or touch; "
+                             "try smooth = false")
 
 
 def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:

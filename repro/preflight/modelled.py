@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from repro.march.simulation import row_times
-from repro.scene import Flow, Scene, scene_tables
+from repro.scene import Aggregate, Flow, Scene, scene_tables
 from repro.scene.time_table import TimeTable
 
 LEFT_OUT = {
@@ -21,7 +21,9 @@ def describe_model(scene: Scene) -> list[tuple[str, str]]:
     """(section, description) in the order of the scene, including absent sections."""
     words = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
              "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
-    return [(name, "; ".join(describe(scene)) if getattr(scene, name) else LEFT_OUT[name])
+    absent = {name for name in LEFT_OUT.keys() - {"aggregate"} if getattr(scene, name) is None}
+    absent |= set() if scene.aggregates else {"aggregate"}
+    return [(name, LEFT_OUT[name] if name in absent else "; ".join(describe(scene)))
             for name, describe in words.items()]
 
 
@@ -31,22 +33,29 @@ def _pore(scene: Scene) -> Iterator[str]:
         yield f"its upper wall a plane of {scene.pore.upper_wall}"
     if scene.numerics.whole_pore:
         yield "meshed as a whole"
-    elif scene.aggregate:
-        yield "meshed around the aggregate (3.1)"
+    elif scene.aggregates:
+        yield f"meshed around the aggregate{'s' * (len(scene.aggregates) > 1)} (3.1)"
     else:
         yield "meshed over three widths (3.1)"
 
 
 def _aggregate(scene: Scene) -> Iterator[str]:
-    seed = scene.aggregate
+    several = len(scene.aggregates) > 1
+    for label, seed in zip(scene.labels, scene.aggregates):
+        yield f"{label}: {_seed(seed)}" if several else _seed(seed)
+        if seed.inert_fraction:
+            yield f"{100 * seed.inert_fraction:g} % of it inert at t = 0"
+
+
+def _seed(seed: Aggregate) -> str:
+    """Describe a seed."""
+    wall = f"on the {seed.wall} wall"
     if seed.outline is None:
-        yield (f"a half-disc of biomass of radius {seed.radius:g} um on the lower wall at "
-               f"x = {seed.position:g} um")
-    else:
-        through = "a spline through" if seed.smooth else "straight lines between"
-        yield f"biomass inside {through} {len(seed.outline)} points, on the lower wall"
-    if seed.inert_fraction:
-        yield f"{100 * seed.inert_fraction:g} % of it inert at t = 0"
+        return (f"a half-disc of biomass of radius {seed.radius:g} um {wall} at "
+                f"x = {seed.position:g} um")
+    through = "a spline through" if seed.smooth else "straight lines between"
+    shift = f", moved by {seed.position:g} um" if seed.position else ""
+    return f"biomass inside {through} {len(seed.outline)} points{shift}, {wall}"
 
 
 def _flow(scene: Scene) -> Iterator[str]:
@@ -56,7 +65,7 @@ def _flow(scene: Scene) -> Iterator[str]:
         yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, 24e-6, 'm/day')}"
     else:
         yield f"driven by a head of {_over_time(flow.head, 1e-4, 'cm')} over the whole pore"
-    if scene.aggregate:
+    if scene.aggregates:
         yield _slowed_by(flow)
         yield {"laplacian": "interface in the form of (1) [E2]",
                "traction": "continuous traction [E2]"}[scene.numerics.interface]
@@ -126,7 +135,8 @@ def _growth(scene: Scene) -> Iterator[str]:
            "its biomass, (14)-(29)")
     yield f"films under {growth.minimum_film:g} um close (2.3.3)"
     yield f"fluid forces {growth.fluid_forces}"
-    yield f"the lower wall {growth.wall}"
+    seats = sorted({seed.wall for seed in scene.aggregates})
+    yield f"the {' and the '.join(seats)} wall {growth.wall}"
     for key in ("bonding_strength", "tensile_strength"):
         if getattr(growth, key) is not None:
             yield f"{key.replace('_', ' ')} {scene_tables(scene)['growth'][key]}"

@@ -7,14 +7,13 @@ the aggregate reaches. Tables of the scene have their largest values.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from repro.fem.outline import Outline
-from repro.fem.sizing import meshed_extent
 from repro.model.flow import MPA_PER_UM
 from repro.model.kinetics import rate_law
-from repro.model.meshing import initial_outline, least_gap, sized, whole_width_of
+from repro.model.meshing import Meshing, initial_outlines, least_gap, sized, whole_width_of
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
 from repro.model.uptake_law import UptakeLaw
@@ -34,37 +33,48 @@ class Number:
 
 @dataclass(frozen=True)
 class Sizes:
-    """The aggregate at a time (h): area (um2), thickness (um), reach (um) to either side of the
-    origin; contact: does it touch the opposite wall?"""
+    """The aggregates at a time (h): area (um2) of all, largest thickness (um), reach (um) to either
+    side of the origin; contact: does one touch the opposite wall? length: twice the reach of the
+    only one, or the sum of the lengths of several (um)."""
 
     time: float
     area: float
     thickness: float
     reach: float
     contact: bool
+    length: float
+
+    @classmethod
+    def of(cls, time: float, sizes: Sequence[tuple[float, float, float, float]],
+           thin: float) -> Sizes:
+        """Sizes of aggregates with area, thickness, upstream and downstream end; thin: thickness
+        above which one touches the opposite wall."""
+        if not sizes:
+            return cls(time, 0.0, 0.0, 0.0, False, 0.0)
+        areas, thicknesses, first, last = zip(*sizes)
+        reach = max(max(-x for x in first), max(last))
+        length = sum(last) - sum(first) if len(sizes) > 1 else 2 * reach
+        return cls(time, sum(areas), max(thicknesses), reach, max(thicknesses) > thin, length)
 
 
 def at_start(scene: Scene) -> Sizes:
-    """Sizes of the seed; zero without an aggregate."""
-    if scene.aggregate is None:
-        return Sizes(0.0, 0.0, 0.0, 0.0, False)
-    seed = scene.aggregate
-    thin = scene.pore.width - least_gap(scene)
-    if seed.outline is None:
-        reach = seed.radius + abs(seed.position)
-        return Sizes(0.0, math.pi / 2 * seed.radius**2, seed.radius, reach, seed.radius > thin)
-    outline = initial_outline(scene)
-    return _sizes(0.0, outline, outline.thickness > thin)
+    """Sizes of the seeds; zero without an aggregate."""
+    drawn = (_sizes(outline) if seed.outline else
+             (math.pi / 2 * seed.radius**2, seed.radius, seed.position - seed.radius,
+              seed.position + seed.radius)
+             for seed, outline in zip(scene.aggregates, initial_outlines(scene)))
+    return Sizes.of(0.0, list(drawn), scene.pore.width - least_gap(scene))
 
 
 def reached(pore: Pore) -> Sizes:
-    """Sizes of the aggregate of a pore."""
-    return _sizes(pore.time, pore.boundary, pore.contact)
+    """Sizes of the aggregates of a pore."""
+    sizes = Sizes.of(pore.time, list(map(_sizes, pore.outlines)), math.inf)
+    return replace(sizes, contact=pore.contact)
 
 
-def _sizes(time: float, outline: Outline, contact: bool) -> Sizes:
-    reach = max(-outline.upstream, outline.downstream)
-    return Sizes(time, outline.area, outline.thickness, reach, contact)
+def _sizes(outline: Outline) -> tuple[float, float, float, float]:
+    """Area, thickness, upstream and downstream end of an aggregate."""
+    return outline.area, outline.thickness, outline.upstream, outline.downstream
 
 
 def fastest_growth(scene: Scene) -> float:
@@ -202,9 +212,7 @@ def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Num
 
 def half_length(scene: Scene) -> float:
     """Half of the length (um) that is meshed at t = 0."""
-    seed = initial_outline(scene)
-    first, last = meshed_extent(seed, whole_width_of(scene), scene.pore.length,
-                                scene.numerics.whole_pore)
+    first, last = Meshing.of(scene).extent(initial_outlines(scene))
     return (last - first) / 2
 
 
@@ -226,7 +234,7 @@ def stresses(scene: Scene, speed: float, end: Sizes | None) -> tuple[float, floa
     gap = max(width - end.thickness, least_gap(scene))
     film_loss = math.inf if end.contact else (width / gap) ** 3
     body_loss = resistance_of(drive).loss(whole)
-    drop = 12 * viscosity * speed * 2 * end.reach / whole**2 * min(body_loss, film_loss)
+    drop = 12 * viscosity * speed * end.length / whole**2 * min(body_loss, film_loss)
     if drive.head is not None:
         drop = min(drop, MPA_PER_UM * drive.density * drive.gravity * drive.head / modulus)
     return shear, drop

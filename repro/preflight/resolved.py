@@ -26,7 +26,7 @@ def find_unresolved_flow(scene: Scene) -> Iterator[Caveat]:
 
     Yields nothing if the flow is resolved or the scene has no outline.
     """
-    if scene.flow is None or scene.aggregate is None or scene.aggregate.outline is None:
+    if scene.flow is None or all(seed.outline is None for seed in scene.aggregates):
         return
     losses = _compute_losses(scene, at_time(scene.flow, 0.0))
     if len(losses) < 2 or (len(losses) == 2 and _is_converged(losses)):

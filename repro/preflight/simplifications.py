@@ -20,7 +20,7 @@ from repro.model.meshing import (
     whole_width_of,
 )
 from repro.model.pore import Pore
-from repro.model.surface import surface
+from repro.model.surface import least_stretched
 from repro.model.transport_in_time import transport_in_time
 from repro.preflight import numbers
 from repro.preflight.numbers import Number, Sizes
@@ -98,7 +98,7 @@ def _has(scene: Scene, part: str) -> bool:
     section: object = scene
     for name in part.split("."):
         section = section and getattr(section, name)
-    return section is not None
+    return section not in (None, ())
 
 
 def _inertia(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
@@ -264,7 +264,9 @@ def _seed_film(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat
     share = min(1.0, gap / film(scene))
     nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.scheme.order
     if nodes < ACROSS_FILM:
-        key = "aggregate.radius" if scene.aggregate.outline is None else "aggregate.outline"
+        place, seed = max(zip(scene.places, scene.aggregates), key=lambda each: each[1].height(
+            scene.pore.width))
+        key = f"{place}.radius" if seed.outline is None else f"{place}.outline"
         yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "
                      f"{nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its flow "
                      "depends on the mesh, whose elements are sized for films of at least "
@@ -318,14 +320,14 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
     """Warn if creases begin to lower the energy of the surface, or if positions at t = 0 fold."""
     if not pore.bodies:
         return
-    if not pore.body.origin_known:
+    if not all(body.origin_known for body in pore.bodies):
         yield Caveat(ORIGIN, f"from t = {pore.time:.4g} h on the positions at t = 0 fold: fields "
                      "have no displacement, position at t = 0, theta and J; nothing else depends "
                      'on them with growth.new_biomass = "stress_free"')
-    limit = pore.body.solid.energy.crease
+    limit = pore.bodies[0].solid.energy.crease
     if limit is None:
         return
-    crease = surface(pore)
+    crease = least_stretched(pore)
     if crease.least >= limit:
         return
     x, y = crease.place
@@ -340,10 +342,10 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
 CHECKS: dict[Callable[[Scene, Numbers, Sizes], Iterator[Caveat]], tuple[str, ...]] = {
     _inertia: ("flow",),
     _cells: ("flow", "substrates"),
-    _diffusivities: ("aggregate", "substrates"),
-    _seed_film: ("aggregate", "flow"),
-    _ends: ("aggregate",),
-    _drag_layer: ("aggregate", "flow.permeability"),
+    _diffusivities: ("aggregates", "substrates"),
+    _seed_film: ("aggregates", "flow"),
+    _ends: ("aggregates",),
+    _drag_layer: ("aggregates", "flow.permeability"),
     _fronts: ("kinetics",),
     _demand: ("kinetics", "substrates.acceptor"),
     _lag: ("growth",),

@@ -77,7 +77,9 @@ def _value(column: int) -> str:
 
 
 def flat(tables: object, key: str = "") -> dict[str, object]:
-    """Nested tables as {"numerics.preset": value}; lists stay unchanged."""
+    """Nested tables as {"numerics.preset": value}; lists of values stay unchanged."""
+    if isinstance(tables, list) and tables and all(isinstance(each, dict) for each in tables):
+        tables = {str(number): each for number, each in enumerate(tables, 1)}
     if not isinstance(tables, dict):
         return {key: tables}
     flattened: dict[str, object] = {}

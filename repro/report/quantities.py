@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from repro.report.charts import MOST_POINTS, Chart, Line
 from repro.report.reading import Run
 from repro.results import names
-from repro.results.columns import PARTS, SUBSTRATES
+from repro.results.columns import BODY, PARTS, SUBSTRATES
 from repro.results.jumps import with_jumps
 from repro.results.quantities import Quantity
 
@@ -101,6 +102,11 @@ DERIVED = (
 KNOWN = names.KNOWN | {each.name: each for each in DERIVED}
 
 
+def _label(name: str) -> str:
+    """Return the label of a column or a derived quantity."""
+    return KNOWN[name].label if name in KNOWN else names.label(name)
+
+
 def _pair(pattern: str) -> tuple[str, ...]:
     """Return the names of a quantity of both substrates, by a pattern."""
     return tuple(pattern.format(name) for name in SUBSTRATES)
@@ -136,6 +142,19 @@ KINDS = (
 )
 
 
+def kinds(drawable: Iterable[str]) -> list[Kind]:
+    """Return the charts of columns: ``KINDS``, and those that compare aggregates."""
+    of_bodies = map(partial(_of_bodies, list(drawable)), BODY)
+    return [*KINDS, *(kind for kind in of_bodies if kind.drawn)]
+
+
+def _of_bodies(drawable: Sequence[str], quantity: Quantity) -> Kind:
+    """Make the chart of a quantity of each aggregate; empty for a coordinate."""
+    drawn = () if quantity.signed and quantity.name.endswith("_um") else tuple(
+        name for name in drawable if names.label_in(name, quantity))
+    return Kind(f"Each aggregate: {quantity.words}", quantity.label, drawn)
+
+
 def series(run: Run) -> dict[str, TimeSeries]:
     """Return times (h) and values of all quantities of a run that can be drawn, by name.
 
@@ -160,9 +179,8 @@ def charts_of(run: Run) -> list[Chart]:
         return []
     drawable, marks = series(run), contact(run)
     drawn_charts = []
-    for kind in KINDS:
-        lines = [_line(KNOWN[name].label, name, drawable)
-                 for name in kind.drawn if name in drawable]
+    for kind in kinds(drawable):
+        lines = [_line(_label(name), name, drawable) for name in kind.drawn if name in drawable]
         if lines:
             drawn_charts.append(kind.chart(kind.title, lines, marks))
     return drawn_charts
@@ -171,10 +189,10 @@ def charts_of(run: Run) -> list[Chart]:
 def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
     """Make a chart for each quantity, with one line for each run."""
     by_run, overlays = [series(run) if len(run.times) > 1 else {} for run in runs], []
-    for kind in KINDS:
+    for kind in kinds(dict.fromkeys(name for drawable in by_run for name in drawable)):
         for name in kind.drawn:
             lines = [_line(label, name, drawable) for label, drawable in zip(labels, by_run)]
-            title = kind.title if len(kind.drawn) == 1 else f"{kind.title}: {KNOWN[name].label}"
+            title = kind.title if len(kind.drawn) == 1 else f"{kind.title}: {_label(name)}"
             if any(name in drawable for drawable in by_run):
                 overlays.append(kind.chart(title, lines))
     return overlays

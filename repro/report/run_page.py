@@ -15,7 +15,7 @@ from repro.results import names
 PHYSICS = {
     "flow": "Stokes flow through pore and aggregate (2.1)",
     "substrates": "electron acceptor and donor, or one of them (2.2)",
-    "aggregate": "an aggregate of biomass on the lower wall",
+    "aggregate": "one or more aggregates of biomass on the walls",
     "kinetics": "uptake, growth and decay (2.2)",
     "growth": "growth of the aggregate as a neo-Hookean body (2.3)",
 }
@@ -131,7 +131,9 @@ def _assumed(run: Run) -> str:
             and (part != "numerics" or NEEDED[key] in tables)]
     ends = {"bonding_strength", "tensile_strength"} & tables.get("growth", {}).keys()
     fate = "a run ends where the aggregate detaches or tears" if ends else "no detachment"
-    assumptions.insert(0, f"a pore in the plane, one aggregate, {fate}")
+    bodies = tables.get("aggregate")
+    count = f"{len(bodies)} aggregates" if isinstance(bodies, list) else "one aggregate"
+    assumptions.insert(0, f"a pore in the plane, {count}, {fate}")
     return f"Assumed: {'; '.join(assumptions)}."
 
 

@@ -9,9 +9,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from repro.model.pore import Pore
-from repro.model.solid import Strained
 from repro.model.solving import Solved
-from repro.model.surface import STRETCH, surface
+from repro.model.surface import STRETCH, surfaces
 from repro.results.field_files import Grid
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Scene
@@ -29,10 +28,16 @@ class State:
     solved: Solved
 
     @cached_property
-    def strained(self) -> Strained:
-        """Deformation of the aggregate since t = 0, at the quadrature points (t, q) of growth."""
+    def J(self) -> np.ndarray:
+        """(t, q) J, the volume ratio since t = 0, at the quadrature points of growth."""
         mesh = self.pore.mesh
-        return self.pore.body.solid.strained(mesh.points[mesh.body])
+        return mesh.by_triangle([body.solid.strained(mesh.points[region.nodes]).J
+                                 for body, region in zip(self.pore.bodies, mesh.regions)])
+
+    @property
+    def theta(self) -> np.ndarray:
+        """(t, q) theta at the same points."""
+        return self.pore.mesh.by_triangle([body.theta for body in self.pore.bodies])
 
     @cached_property
     def stress(self) -> np.ndarray:
@@ -47,8 +52,8 @@ class State:
         return growth.largest_principal(self.stress)
 
     def mean(self, value: np.ndarray) -> np.ndarray:
-        """(t,) means of values (t, q) over each of the aggregate's triangles at t = 0."""
-        dx = self.pore.body.solid.at.dx
+        """(t,) means of values (t, q) over each of the aggregates' triangles at t = 0."""
+        dx = self.pore.mesh.by_triangle([body.solid.at.dx for body in self.pore.bodies])
         return (value * dx).sum(axis=1) / dx.sum(axis=1)
 
 
@@ -63,9 +68,10 @@ NEEDS: dict[str, Callable[[State], bool]] = {
     "acceptor": lambda state: _has("acceptor", state),
     "donor": lambda state: _has("donor", state),
     "biomass": lambda state: state.scene.kinetics is not None,
-    "growth": lambda state: state.scene.growth is not None,
-    ORIGIN: lambda state: state.scene.growth is not None and state.pore.body.origin_known,
-    "stress": lambda state: bool(state.scene.growth) and state.pore.accumulates}
+    "growth": lambda state: state.scene.growth is not None and bool(state.pore.bodies),
+    ORIGIN: lambda state: (NEEDS["growth"](state)
+                           and all(body.origin_known for body in state.pore.bodies)),
+    "stress": lambda state: NEEDS["growth"](state) and state.pore.accumulates}
 
 
 @dataclass(frozen=True)
@@ -133,7 +139,7 @@ def _density(name: str, state: State) -> np.ndarray:
 
 def _displacement(state: State) -> np.ndarray:
     mesh = state.pore.mesh
-    return mesh.points[mesh.body] - state.pore.body.reference
+    return mesh.points[mesh.body] - state.pore.origin[mesh.body]
 
 
 def _pressure(state: State) -> np.ndarray:
@@ -142,9 +148,11 @@ def _pressure(state: State) -> np.ndarray:
 
 
 def _stretch(state: State) -> np.ndarray:
-    free_surface = surface(state.pore)
-    stretch = np.full(len(state.pore.body.theta), np.inf)
-    np.minimum.at(stretch, free_surface.cells, free_surface.stretch)
+    mesh = state.pore.mesh
+    stretches = [np.full(len(region.triangles), np.inf) for region in mesh.regions]
+    for stretch, free_surface in zip(stretches, surfaces(state.pore)):
+        np.minimum.at(stretch, free_surface.cells, free_surface.stretch)
+    stretch = mesh.by_triangle(stretches)
     return np.where(np.isinf(stretch), np.nan, stretch)
 
 
@@ -170,15 +178,17 @@ ARRAYS = (
     Array("displacement_um", "displacement since t = 0", "x - X", _displacement, needs=ORIGIN,
           body=True, signed=True),
     Array("position_t0_um", "position at t = 0", "X, where the material was",
-          lambda state: state.pore.body.reference, needs=ORIGIN, body=True, signed=True),
+          lambda state: state.pore.origin[state.pore.mesh.body], needs=ORIGIN, body=True,
+          signed=True),
     Array("pressure_MPa", "pressure P of the aggregate", "P (21), linear between the corners",
           _pressure, needs="stress", body=True, signed=True),
-    Array("region", "aggregate (1) or fluid (0)", "1 in the aggregate's triangles",
-          lambda state: state.pore.mesh.biomass.astype(float), cells=True),
+    Array("region", "aggregate (1) or fluid (0)",
+          "1 in the aggregate's triangles; of several, their number from 1",
+          lambda state: state.pore.mesh.topology.region.astype(float), cells=True),
     Array("theta", "expansion theta", "(28)-(29), the mean over the triangle at t = 0",
-          lambda state: state.mean(state.pore.body.theta), needs=ORIGIN, cells=True, body=True),
+          lambda state: state.mean(state.theta), needs=ORIGIN, cells=True, body=True),
     Array("J", "volume ratio J", "det dx/dX, the mean over the triangle at t = 0",
-          lambda state: state.mean(state.strained.J), needs=ORIGIN, cells=True, body=True),
+          lambda state: state.mean(state.J), needs=ORIGIN, cells=True, body=True),
     Array("surface_stretch", "elastic stretch along the free surface",
           f"{STRETCH}; in the triangles at the free surface, of two edges the lesser", _stretch,
           needs="growth", cells=True, body=True),

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from repro.fem.walls import BOTTOM, TOP, numbered
 from repro.march import balance
 from repro.march.balance import Ledger
 from repro.march.state import Report
 from repro.model.energies.neo_hookean import BIOT, CREASE
-from repro.model.surface import BESIDE, STRETCH, surface
+from repro.model.surface import BESIDE, STRETCH, least_stretched, surfaces
 from repro.model.transport_in_time import transport_in_time
 from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Growth, Scene
@@ -25,11 +27,11 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
     "acceptor": lambda scene, at: _solved("acceptor", at),
     "donor": lambda scene, at: _solved("donor", at),
-    "aggregate": lambda scene, at: at.pore.outline is not None,
-    "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
-    "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None,
-    "adhesion": lambda scene, at: (scene.growth is not None and at.pore.accumulates
-                                   and _has_adhesion(scene.growth))}
+    "aggregate": lambda scene, at: bool(at.pore.bodies),
+    "biomass": lambda scene, at: bool(at.pore.bodies) and scene.kinetics is not None,
+    "growth": lambda scene, at: bool(at.pore.bodies) and scene.growth is not None,
+    "adhesion": lambda scene, at: (scene.growth is not None and bool(at.pore.bodies)
+                                   and at.pore.accumulates and _has_adhesion(scene.growth))}
 
 
 def _has_adhesion(growth: Growth) -> bool:
@@ -89,12 +91,13 @@ def _of_steps(defect: Callable[[Ledger], float], at: Report) -> float:
 
 
 def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> list[Quantity]:
-    """The largest mean of a stress, and its place."""
-    return [Quantity(f"{name}_MPa", words, formula, lambda scene, at: peak(scene, at).value, label,
-                     "adhesion", signed=True),
+    """The largest mean of a stress, and its place; peak: takes the arguments of a column's value.
+    """
+    return [Quantity(f"{name}_MPa", words, formula, lambda *of: peak(*of).value, label, "adhesion",
+                     signed=True),
             *(Quantity(f"{name}_{axis}_um", f"place of the {words}, {axis}",
                        f"middle of the part whose mean is the {words}",
-                       lambda scene, at, axis=axis: getattr(peak(scene, at), axis),
+                       lambda *of, axis=axis: getattr(peak(*of), axis),
                        f"{axis} of {label}", "adhesion", signed=axis == "x") for axis in "xy")]
 
 
@@ -108,8 +111,43 @@ def _loading(scene: Scene) -> Loading:
     return _adhesion().Loading.of(scene)
 
 
-def _load(part: str, scene: Scene, at: Report) -> float:
-    return getattr(_adhesion().fluid_load(_loading(scene), at.pore, at.solved), part)
+def _all(value: Callable[[int, Scene, Report], float],
+         combine: Callable[[Iterable[float]], float]) -> Callable[[Scene, Report], float]:
+    """The value of all aggregates, from those of each by its number from zero."""
+    return lambda scene, at: combine(value(k, scene, at) for k in range(len(at.pore.bodies)))
+
+
+def _of_outline(part: str, k: int, scene: Scene, at: Report) -> float:
+    return getattr(at.pore.outlines[k], part)
+
+
+def _area(k: int, scene: Scene, at: Report) -> float:
+    return at.pore.outlines[k].area
+
+
+def _load(part: str, k: int, scene: Scene, at: Report) -> float:
+    load = _adhesion().fluid_load(_loading(scene), at.pore.focused(k), at.solved)
+    return getattr(load, part)
+
+
+def _uptake(substrate: int, k: int, scene: Scene, at: Report) -> float:
+    from repro.model.substrates import uptakes  # a scene without [substrates] does not load it
+    return float(uptakes(at.solved.problem, at.pore, at.solved.concentrations)[k, substrate])
+
+
+def _film(k: int, scene: Scene, at: Report) -> float:
+    spans = at.pore.bodies[k].spans
+    return 0.0 if spans else at.pore.outlines[k].gap(at.pore.mesh.walls)
+
+
+def _gap(k: int, scene: Scene, at: Report) -> float | None:
+    outlines = at.pore.outlines
+    others = (other for number, other in enumerate(outlines) if number != k)
+    return min((outlines[k].film(other)[0] for other in others), default=None)
+
+
+def _contact_length(wall: int, k: int, scene: Scene, at: Report) -> float:
+    return at.pore.outlines[k].contact_length(numbered(at.pore.mesh.walls, wall))
 
 
 def _composition(index: int, scene: Scene, at: Report) -> float:
@@ -141,15 +179,19 @@ SERIES = (
     *_both("inlet_{}_mg_per_L", "{} at the inlet of the meshed part",
            "integral of u_x C over the inlet of the meshed part / that of u_x; without flow, "
            "the mean of C over it", lambda k, scene, at: at.solved.fluxes[k].inlet),
-    Quantity("aggregate_area_um2", "area of the aggregate", "area inside its boundary",
-             lambda scene, at: at.pore.outline.area, "area", "aggregate"),
-    Quantity("thickness_um", "thickness of the aggregate", "largest y of its boundary",
-             lambda scene, at: at.pore.outline.thickness, "thickness", "aggregate"),
-    Quantity("upstream_um", "upstream end of the aggregate", "smallest x of its boundary",
-             lambda scene, at: at.pore.outline.upstream, "upstream end", "aggregate",
+    Quantity("aggregate_area_um2", "area of the aggregate",
+             "area inside its boundary; of several, the sum",
+             _all(_area, sum), "area", "aggregate"),
+    Quantity("thickness_um", "thickness of the aggregate",
+             "largest distance of its boundary from its wall; of several, the largest",
+             _all(partial(_of_outline, "thickness"), max), "thickness", "aggregate"),
+    Quantity("upstream_um", "upstream end of the aggregate",
+             "smallest x of its boundary; of several, the smallest",
+             _all(partial(_of_outline, "upstream"), min), "upstream end", "aggregate",
              signed=True),
-    Quantity("downstream_um", "downstream end of the aggregate", "largest x of its boundary",
-             lambda scene, at: at.pore.outline.downstream, "downstream end", "aggregate",
+    Quantity("downstream_um", "downstream end of the aggregate",
+             "largest x of its boundary; of several, the largest",
+             _all(partial(_of_outline, "downstream"), max), "downstream end", "aggregate",
              signed=True),
     Quantity("meshed_length_um", "length of the meshed part", "x of its outlet - x of its inlet",
              lambda scene, at: at.pore.mesh.ends[1] - at.pore.mesh.ends[0], "length"),
@@ -182,10 +224,10 @@ SERIES = (
              f"least of {STRETCH}, on edges farther from a contact line than {100 * BESIDE:g} % of "
              "the free surface's length; with the neo-Hookean energy it creases below "
              f"{CREASE:g}, and folds below {BIOT:g}",
-             lambda scene, at: surface(at.pore).least, "least stretch", "growth"),
+             lambda scene, at: least_stretched(at.pore).least, "least stretch", "growth"),
     *(Quantity(f"surface_stretch_min_{axis}_um", f"place of the least surface stretch, {axis}",
                "middle of the edge with the least elastic stretch along the free surface",
-               lambda scene, at, k=k: surface(at.pore).place[k], f"{axis} of least stretch",
+               lambda scene, at, k=k: least_stretched(at.pore).place[k], f"{axis} of least stretch",
                "growth", signed=True) for k, axis in enumerate("xy")),
     *_peak("wall_traction_max", "largest traction that a wall must bear",
            "largest (max(pull, 0)^2 + shear^2)^(1/2), means over W / 20 along the contact surface",
@@ -198,19 +240,87 @@ SERIES = (
     *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
                "integral of the water's stress over the interface, or of its drag over a permeable "
                "aggregate; the head is zero at the outlet of the meshed part",
-               partial(_load, axis), f"force {axis}", "adhesion and flow", signed=True)
+               _all(partial(_load, axis), sum), f"force {axis}", "adhesion and flow", signed=True)
       for axis in "xy"),
     Quantity("fluid_moment_nN", "moment of the fluid on the aggregate, per depth",
-             "integral of x f_y - y f_x, x from the middle of the contact with the lower wall",
-             partial(_load, "moment"), "moment", "adhesion and flow", signed=True),
+             "integral of x f_y - y f_x from the middle of the contact with its wall; of several, "
+             "the sum",
+             _all(partial(_load, "moment"), sum), "moment", "adhesion and flow", signed=True),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
              lambda scene, at: len(at.pore.mesh.points), "nodes"),
     Quantity("remeshed", "new mesh", "1 if a new mesh was generated since the last row, else 0",
              lambda scene, at: int(at.remeshes > 0 or at.new_mesh), yes_no=True),
     Quantity("contact", "contact with the opposite wall",
-             "1 if a node of the aggregate lies on the upper wall, else 0",
+             "1 if an aggregate touches both walls, else 0",
              lambda scene, at: int(at.pore.contact), yes_no=True),
 )
+
+#: Columns of each aggregate of a scene with several: value takes its place in the pore's list, the
+#: scene and a Report. NAME is its name, or its number from one. They are empty once it has left.
+BODY = (
+    Quantity("aggregate_NAME_area_um2", "area", "area inside its boundary", _area, "area",
+             "aggregate"),
+    Quantity("aggregate_NAME_thickness_um", "thickness",
+             "largest distance of its boundary from its wall", partial(_of_outline, "thickness"),
+             "thickness", "aggregate"),
+    *(Quantity(f"aggregate_NAME_{end}_um", f"{end} end", f"{extreme} x of its boundary",
+               partial(_of_outline, end), f"{end} end", "aggregate", signed=True)
+      for end, extreme in (("upstream", "smallest"), ("downstream", "largest"))),
+    Quantity("aggregate_NAME_film_um", "thinnest film",
+             "least thickness of the fluid between it and a wall that it does not touch; zero if "
+             "it touches both", _film, "film", "aggregate"),
+    Quantity("aggregate_NAME_gap_um", "distance from another aggregate",
+             "least thickness of the fluid between it and another one", _gap, "gap", "aggregate"),
+    *(Quantity(f"aggregate_NAME_{wall}_contact_um", f"contact with the {wall} wall",
+               "length of its contact surface there", partial(_contact_length, number),
+               f"{wall} contact", "aggregate")
+      for wall, number in (("lower", BOTTOM), ("upper", TOP))),
+    Quantity("aggregate_NAME_biomass_pg_per_m", "biomass", "integral of X_A + X_I",
+             lambda k, scene, at: at.pore.bodies[k].mass, "biomass", "biomass"),
+    *(Quantity(f"aggregate_NAME_{name}_uptake_ug_per_m_per_h", f"uptake of the {name}",
+               "integral of (7)-(8) over it, at the present concentrations", partial(_uptake, k),
+               f"{name} uptake", f"{name} and biomass", signed=True)
+      for k, name in enumerate(SUBSTRATES)),
+    Quantity("aggregate_NAME_surface_stretch_min",
+             "least elastic stretch along the free surface", "as surface_stretch_min",
+             lambda k, scene, at: surfaces(at.pore)[k].least, "least stretch", "growth"),
+    *_peak("aggregate_NAME_wall_traction_max", "largest traction that a wall must bear",
+           "as wall_traction_max_MPa", "wall traction",
+           lambda k, scene, at: _adhesion().wall_peaks(_loading(scene), at.pore, at.solved)[k]),
+    *_peak("aggregate_NAME_tensile_stress_max", "largest tensile stress",
+           "as tensile_stress_max_MPa", "tensile stress",
+           lambda k, scene, at: _adhesion().tensile_peaks(_loading(scene), at.pore, at.solved)[k]),
+    *(Quantity(f"aggregate_NAME_fluid_force_{axis}_uN_per_m", f"force of the fluid, {axis}",
+               f"as fluid_force_{axis}_uN_per_m", partial(_load, axis), f"force {axis}",
+               "adhesion and flow", signed=True) for axis in "xy"),
+)
+
+
+def of_body(quantity: Quantity, label: str) -> Quantity:
+    """A quantity of ``BODY`` for the aggregate with a name."""
+    return replace(quantity, name=quantity.name.replace("NAME", label),
+                   words=f"{quantity.words}, aggregate {label}",
+                   value=partial(_of_named, quantity.value, label),
+                   label=f"{quantity.label}, {label}")
+
+
+def _of_named(value: Callable, name: str, scene: Scene, at: Report) -> float | None:
+    """A value of the aggregate with a name; None if it is not in the pore."""
+    names = [body.name for body in at.pore.bodies]
+    return value(names.index(name), scene, at) if name in names else None
+
+
+def series(scene: Scene) -> tuple[Quantity, ...]:
+    """The quantities of ``timeseries.csv`` of a scene: ``SERIES``, and ``BODY`` for each of several
+    aggregates."""
+    labels = scene.labels if len(scene.aggregates) > 1 else []
+    return *SERIES, *(of_body(quantity, label) for label in labels for quantity in BODY)
+
+
+def column_names(scene: Scene) -> list[str]:
+    """The columns of ``timeseries.csv`` of a scene."""
+    return [quantity.name for quantity in series(scene)]
+
 
 #: Parts of a substrate's ledger: label and formula.
 PARTS = {"supplied": ("supplied", "supply times the flow through the inlet, over the step"),
@@ -255,7 +365,8 @@ LEDGER_COLUMNS = [quantity.name for quantity in LEDGER]
 def row(scene: Scene, instant: Report) -> dict[str, float | None]:
     """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
     return {quantity.name: quantity.reported(scene, instant)
-            if is_modelled(quantity, NEEDS, scene, instant) else None for quantity in SERIES}
+            if is_modelled(quantity, NEEDS, scene, instant) else None
+            for quantity in series(scene)}
 
 
 def ledger_row(scene: Scene, ledger: Ledger) -> list[float | None]:

@@ -80,7 +80,7 @@ def _draw_panel(ax: Any, results: Results, columns: Sequence[str]) -> None:
     marker = "o" if len(results.time) == 1 else ""
     for name in columns:
         times, values = with_jumps(name, results.time, results[name], results.tables)
-        ax.plot(times, values, marker=marker, label=names.KNOWN[name].label)
+        ax.plot(times, values, marker=marker, label=names.label(name))
     if marker:
         ax.set_xticks(results.time)
     many = len(columns) > 1
@@ -96,7 +96,7 @@ def _draw_panel(ax: Any, results: Results, columns: Sequence[str]) -> None:
 def _common(columns: Sequence[str]) -> str:
     """The label of a column, or the common part of the names of several columns."""
     if len(columns) == 1:
-        return names.KNOWN[columns[0]].label or names.words(columns[0])
+        return names.label(columns[0])
     return columns[0].partition("_")[0]
 
 

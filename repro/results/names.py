@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from repro.results.arrays import ARRAYS
-from repro.results.columns import LEDGER, SERIES
+from repro.results.columns import BODY, LEDGER, SERIES, of_body
 from repro.results.quantities import SMALLER, Quantity, ending, unit_of
 
 #: Every column and array by its name.
@@ -18,10 +18,32 @@ YES_NO = {name for name, quantity in KNOWN.items() if quantity.yes_no}
 DEFECTS = {name for name in KNOWN if name.endswith("_balance")}
 
 
+def known(name: str) -> Quantity | None:
+    """The quantity of a name, also that of one aggregate among several; None if it is unknown."""
+    if name in KNOWN:
+        return KNOWN[name]
+    return next((of_body(quantity, label_in(name, quantity)) for quantity in BODY
+                 if label_in(name, quantity)), None)
+
+
+def label_in(name: str, quantity: Quantity) -> str:
+    """The label of the aggregate in the name of a quantity of ``BODY``; empty in other names."""
+    before, after = quantity.name.split("NAME")
+    own = len(name) > len(before + after) and name.startswith(before) and name.endswith(after)
+    return name[len(before):-len(after)] if own else ""
+
+
+def label(name: str) -> str:
+    """The short name of a column, for a legend; its words if it has none."""
+    quantity = known(name)
+    return quantity.label if quantity and quantity.label else words(name)
+
+
 def words(name: str) -> str:
     """The words of a name, without its unit; an unknown name without underscores."""
-    if name in KNOWN:
-        return KNOWN[name].words
+    quantity = known(name)
+    if quantity:
+        return quantity.words
     return name.removesuffix(ending(name)).replace("_", " ")
 
 

@@ -98,9 +98,9 @@ class Quantity:
         return unit_of(self.name)
 
     def reported(self, *arguments: Any) -> Any:
-        """Return the value in the unit of the name."""
+        """Return the value in the unit of the name; None if it is None."""
         value = self.value(*arguments)
-        return value if self.unit.factor == 1 else self.unit.factor * value
+        return value if value is None or self.unit.factor == 1 else self.unit.factor * value
 
 
 def is_modelled(quantity: Quantity, conditions: dict[str, Callable[..., bool]],

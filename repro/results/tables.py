@@ -66,7 +66,7 @@ class Results(Mapping[str, np.ndarray]):
                  folder: Path | None = None, tables: Mapping[str, dict] | None = None,
                  provenance: Mapping[str, Any] | None = None):
         self.columns: dict[str, np.ndarray] = {}
-        for key in results.COLUMNS:
+        for key in dict.fromkeys([*results.COLUMNS, *(rows[0] if rows else ())]):
             values = [row[key] for row in rows]
             if key == TIME or values.count(None) < len(values):
                 self.columns[key] = np.array([np.nan if value is None else value

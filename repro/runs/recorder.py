@@ -103,7 +103,7 @@ class Recorder:
         if reported:
             self._add_fields(reported)
             row = results.row(self.scene, reported)
-            self.history.rows.append([row[name] for name in results.COLUMNS])
+            self.history.rows.append(list(row.values()))
             self.history.ledgers += self._ledger_rows(reported.ledgers)
             self.history.remeshes += int(reported.remeshes)
             self.history.iterations = sum_counts(self.history.iterations, reported.iterations)
@@ -172,7 +172,8 @@ class Recorder:
         history = self.history
         if self.state and not is_over(status):
             self._write_checkpoint(self.state)
-        self._write("timeseries.csv", results.write_table, results.COLUMNS, history.rows)
+        self._write("timeseries.csv", results.write_table, results.column_names(self.scene),
+                    history.rows)
         self._write("fields.pvd", results.write_index, history.index)
         ledgers = history.ledgers + self._ledger_rows(self.state.ledgers if self.state else ())
         if ledgers:

@@ -26,8 +26,9 @@ from repro.model.solid import material
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 
-#: Arrays of the mesh and of the aggregate, by the names of their fields.
-OF_MESH = ("points", "cells", "biomass", "loop")
+#: Arrays of the mesh and of an aggregate, by the names of their fields. Those of the second
+#: aggregate end in _2, and so on.
+OF_MESH = ("points", "cells")
 OF_BODY = ("wall", "fixed", "active", "inert", "theta")
 #: Arrays of the concentrations from which Newton's method starts.
 OF_GUESS = ("acceptor", "donor")
@@ -38,9 +39,11 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     pore = state.pore
     guess = pore.concentrations
     arrays = {name: getattr(pore.mesh, name) for name in OF_MESH}
+    arrays["region"] = pore.mesh.topology.region
     arrays["pressure"] = pore.pressure
-    if pore.bodies:
-        arrays |= _body_arrays(pore.body)
+    for number, (body, loop) in enumerate(zip(pore.bodies, pore.mesh.topology.loops)):
+        own = {"loop": loop, **_body_arrays(body)}
+        arrays |= {f"{name}{_ending(number)}": array for name, array in own.items()}
     if guess:
         fields = {name: getattr(guess, name) for name in OF_GUESS}
         arrays |= {name: field for name, field in fields.items() if field is not None}
@@ -56,8 +59,13 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     return plain, arrays
 
 
+def _ending(number: int) -> str:
+    """Ending of the names of an aggregate's arrays, by its number from zero."""
+    return f"_{number + 1}" if number else ""
+
+
 def _body_arrays(body: Body) -> Arrays:
-    """Arrays of the aggregate; a scene has one at most."""
+    """Arrays of an aggregate."""
     arrays = {name: getattr(body, name) for name in OF_BODY}
     arrays["reference"] = body.reference
     if not body.configuration.accumulates:
@@ -87,8 +95,10 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     numerics = scene.numerics
     method = Method(numerics.solver)
     first, last = plain["ends_um"]
-    loops = (arrays["loop"],) if len(arrays["loop"]) else ()
-    mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["biomass"], loops, walls_of(scene),
+    own = [{name.removesuffix(_ending(number)): array for name, array in arrays.items()
+            if name.endswith(_ending(number))} for number in range(len(plain["names"]))]
+    loops = tuple(each["loop"] for each in own)
+    mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["region"], loops, walls_of(scene),
                    (first, last), method)
     space = Space(mesh)
     guess = None
@@ -96,14 +106,15 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
         from repro.model.transport import Concentrations  # a scene without [substrates] has none
         acceptor, donor = map(arrays.get, OF_GUESS)
         guess = Concentrations(acceptor, donor, plain["guess"])
-    bodies = tuple(_body(scene, space, region, plain, arrays) for region in mesh.regions)
+    bodies = tuple(_body(scene, space, region, plain, number, each)
+                   for number, (region, each) in enumerate(zip(mesh.regions, own)))
     return Pore(plain["time_h"], space, bodies, arrays["pressure"], guess, plain["front"])
 
 
-def _body(scene: Scene, space: Space, region: Region, plain: dict, arrays: Arrays) -> Body:
+def _body(scene: Scene, space: Space, region: Region, plain: dict, number: int,
+          arrays: Arrays) -> Body:
     solid = material(space, region, arrays["reference"], energy_of(scene.growth))
     configuration = configuration_of(scene.growth, arrays.get("last", solid.reference))
-    (seat,), (name,) = plain["seats"], plain["names"]
     return Body(solid=solid, configuration=configuration, origin_known=plain["origin_known"],
-                line_speeds=arrays.get("line_speeds"), seat=Seat(*seat), name=name,
-                **{name: arrays[name] for name in OF_BODY})
+                line_speeds=arrays.get("line_speeds"), seat=Seat(*plain["seats"][number]),
+                name=plain["names"][number], **{name: arrays[name] for name in OF_BODY})

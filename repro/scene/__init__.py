@@ -4,6 +4,7 @@
     units       quantities with units
     time_table  values over time
     exact       the units that scenes use, as exact fractions
+    bodies      the aggregates of a scene by name or number
     former      keys and choices of earlier versions
     reading     conversion of TOML tables to dataclasses and back
     rules       constraints between keys

@@ -5,7 +5,9 @@ import tomllib
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
+from repro.scene import bodies
 from repro.scene.reading import Place, did_you_mean, elsewhere, quote
 from repro.scene.units import SceneError, nearest, odd_character
 
@@ -119,11 +121,13 @@ def key_of(entry: str) -> str:
 
 def leave_out(tables: dict, key: str, file: str, known: tuple[str, ...]) -> None:
     """Remove a dotted key or a section from the tables. Raises SceneError if it is absent."""
-    *above, last = key_of(key).split(".")
-    table: object = tables
+    bodies.refuse_unaddressed(tables, key_of(key), f"{file}: --unset {quote(key)}")
+    *above, last = bodies.path_of(tables, key_of(key))
+    table: Any = tables
     for part in above:
-        table = table.get(part) if isinstance(table, dict) else None
-    if not isinstance(table, dict) or last not in table:
+        table = table[part] if isinstance(part, int) else \
+            table.get(part) if isinstance(table, dict) else None
+    if not (isinstance(last, int) or isinstance(table, dict) and last in table):
         hint = did_you_mean("" if key_of(key) in known else elsewhere(key_of(key)[:60], known))
         raise SceneError(f"{file}: --unset {quote(key)}: the scene does not set it{hint}")
     del table[last]
@@ -142,10 +146,13 @@ def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> Non
     if len(path) > MOST_PARTS:
         raise SceneError(f"{file}: --set {quote(entry)}: a key of at most {MOST_PARTS} parts "
                          "is needed")
+    bodies.refuse_unaddressed(tables, key_of(entry), f"{file}: --set {quote(entry)}")
     place = Place(file)
-    for part in path[:-1]:
-        tables, place = tables.setdefault(part, {}), place.below(part)
-        if not isinstance(tables, dict):
+    path = bodies.path_of(tables, key_of(entry))
+    for part, following in zip(path, path[1:]):
+        tables = tables[part] if isinstance(part, int) else tables.setdefault(part, {})
+        place = place.below(str(part))
+        if not isinstance(tables, list if isinstance(following, int) else dict):
             hint = did_you_mean(place.key if place.key in known else "")
             requirement = f"it takes no keys, so that --set {quote(entry)} is not accepted{hint}"
             raise place.refuse(tables, requirement)

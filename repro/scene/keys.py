@@ -19,6 +19,7 @@ from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from repro.scene import bodies
 from repro.scene.arguments import typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.former import with_former
@@ -37,6 +38,7 @@ from repro.scene.units import (
     POSITIVE_FRACTION,
     UP_TO_1,
     UP_TO_20,
+    WORD,
     Flag,
     Points,
     SceneError,
@@ -47,6 +49,7 @@ from repro.scene.units import (
     quantity,
     scene_key,
     section,
+    sections,
     share,
     timed_quantity,
     units_of,
@@ -77,24 +80,26 @@ class Pore:
 
 @dataclass(frozen=True)
 class Aggregate:
-    """The seed on the lower wall (um): a half-disc, or a body with an `outline`.
+    """A seed on a wall (um): a half-disc, or a body with an `outline`.
 
-    `outline`: the points (x, y) of its free surface and of its contact with the upper wall, from
-    the upstream end on the lower wall to the downstream one. With it `radius` is None and
-    `position` zero. `inert_fraction`: X_I / (X_A + X_I) of all of it at t = 0.
+    `outline`: the points (x, y) of its free surface and of its contact with the opposite wall, from
+    the upstream end on its own wall to the downstream one; `position` is added to x. With it
+    `radius` is None. `inert_fraction`: X_I / (X_A + X_I) of all of it at t = 0.
     """
 
     radius: float | None = quantity(
         "5 um", "um", default=None, stated='default "5 um" without outline',
-        about="R_0 of the seed, a half-disc on the lower wall; either this or outline",
+        about="R_0 of the seed, a half-disc on its wall; either this or outline",
         source="Table 1")
     position: float = quantity(
         "0 um", "um", EITHER_SIGN, source=NOT_IN_PAPER,
-        about="x of the middle of the half-disc; 0 is the middle of the pore")
+        about="x of the middle of the half-disc, or what is added to x of the points of outline; 0 "
+              "is the middle of the pore")
     outline: tuple[tuple[float, float], ...] | None = scene_key(
         Points(),
-        about="The seed's surface instead of a half-disc: both ends on the lower wall (y = 0), the "
-        "upstream one first; points with y = pore.width are contact with the upper wall",
+        about="The seed's surface instead of a half-disc, y from the lower wall: both ends on the "
+        "seed's wall (y = 0 on the lower one), the upstream one first; points on the other wall "
+        "(y = pore.width) are contact with it",
         source=NOT_IN_PAPER)
     smooth: bool = scene_key(
         Flag(), about="A spline through the points of outline, or straight lines",
@@ -102,10 +107,23 @@ class Aggregate:
     inert_fraction: float = number(
         0.0, BELOW_1, source=NOT_IN_PAPER,
         about="Share of X_I in the biomass at t = 0, where X_A + X_I = X_m")
+    wall: str = choice(
+        "lower", "upper", source=NOT_IN_PAPER, about="The wall on which the seed sits")
+    name: str | None = scene_key(
+        WORD, source=NOT_IN_PAPER,
+        about="Name of the aggregate among several: in keys such as aggregate.upstream.radius, in "
+              "columns and messages; by default its number, from 1")
 
     def __post_init__(self):
         if self.radius is None and self.outline is None:
             object.__setattr__(self, "radius", SEED_RADIUS)
+
+    def height(self, width: float) -> float:
+        """Distance (um) of its highest point from its wall, in a pore of a width (um)."""
+        if self.outline is None:
+            return needed(self.radius, "a radius")
+        levels = [y for _, y in self.outline]
+        return max(levels) if self.wall == "lower" else width - min(levels)
 
 
 @dataclass(frozen=True)
@@ -314,7 +332,7 @@ class Growth:
         about="The fluid's traction on a viscous aggregate, or its drag within a permeable one")
     wall: str = choice(
         "sliding", "bonded", source="2.3.3",
-        about="Biomass on the lower wall slides along it, or keeps its place there")
+        about="Biomass on the walls of the seeds slides along them, or keeps its place there")
     bonding_strength: float | None = quantity(
         "1e-3 MPa", "MPa", default=None, source="Section 5, without a value",
         about="The run ends if the traction of a wall exceeds it, in the mean over "
@@ -465,15 +483,15 @@ class Scene:
         Name in messages and reports.
     pore : Pore
         The channel; lengths in um.
-    aggregate : Aggregate, optional
-        The colony on the lower wall. None: a clean channel.
+    aggregates : tuple of Aggregate
+        The colonies on the walls. Empty: a clean channel.
     flow : Flow, optional
         Head (um) or mean velocity (um/h). None: pure diffusion.
     substrates : Substrates, optional
         Acceptor and donor; mg/L and um2/h. None: no transport.
     kinetics : Kinetics, optional
         Uptake, growth and decay; 1/h and mg/L. Present if and only if ``substrates`` and
-        ``aggregate`` are.
+        ``aggregates`` are.
     growth : Growth, optional
         Duration and mechanics of growth; h, MPa, um. None: only the state at t = 0.
     numerics : Numerics
@@ -493,10 +511,10 @@ class Scene:
 
     name: str
     pore: Pore = section(Pore, about="The channel", source="Section 2, Figure 1")
-    aggregate: Aggregate | None = section(
-        Aggregate, default=None,
-        about="A colony of biomass on the lower wall; left out: a clean channel",
-        source="Section 4")
+    aggregates: tuple[Aggregate, ...] = sections(
+        Aggregate, "aggregate", source="Section 4",
+        about="A colony of biomass on a wall, or several as [[aggregate]]; left out: a clean "
+              "channel")
     flow: Flow | None = section(
         Flow, default=None,
         about="Stokes flow through pore and aggregate; left out: pure diffusion",
@@ -521,6 +539,24 @@ class Scene:
         if self.numerics.extent is None:
             extent = "full" if self.stagnant else "central"
             object.__setattr__(self, "numerics", replace(self.numerics, extent=extent))
+
+    @property
+    def aggregate(self) -> Aggregate | None:
+        """The only aggregate; None in a clean channel. Raises ValueError if there are several."""
+        if len(self.aggregates) > 1:
+            raise ValueError(f"the scene has {len(self.aggregates)} aggregates; "
+                             "scene.aggregates has them")
+        return next(iter(self.aggregates), None)
+
+    @property
+    def labels(self) -> list[str]:
+        """The name of each aggregate, or its number from 1."""
+        return bodies.labels([seed.name for seed in self.aggregates])
+
+    @property
+    def places(self) -> list[str]:
+        """The dotted key of each aggregate, such as "aggregate.2"; "aggregate" of the only one."""
+        return bodies.places([seed.name for seed in self.aggregates])
 
     @property
     def growing(self) -> GrowingSections:
@@ -565,24 +601,31 @@ class Scene:
         return self.time_tables.jumps(time)
 
     def stated(self, section: str, key: str) -> Stated:
-        """Return the value of a key of a section, a quantity, in the unit of the scene's text."""
-        kind = entries(type(getattr(self, section)))[key].metadata["kind"]
-        value = getattr(getattr(self, section), key)
-        return kind.stated(value, self.units.get(f"{section}.{key}", kind.usual_unit))
+        """Return the value of a key of a section, a quantity, in the unit of the scene's text.
+
+        The section of an aggregate is its dotted key, as in ``places``.
+        """
+        part = self.aggregates[self.places.index(section)] \
+            if section in self.places else getattr(self, section)
+        kind = entries(type(part))[key].metadata["kind"]
+        place = bodies.numbered(self.places, section)
+        return kind.stated(getattr(part, key),
+                           self.units.get(f"{place}.{key}", kind.usual_unit))
 
     def __str__(self) -> str:
         """TOML text with all keys and units; it parses to an equal scene."""
         return toml(scene_tables(self))
 
     def __repr__(self) -> str:
-        sections = [key for key in entries(Scene) if getattr(self, key) is not None]
+        sections = [key for key, entry in entries(Scene).items()
+                    if getattr(self, entry.name) not in (None, ())]
         return f"<Scene {self.name}: {', '.join(sections)}; hash {scene_hash(self)}>"
 
 
 #: Keys added after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "pore": {"upper_wall": "no slip"},
-    "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
+    "aggregate": {"position": "0.0 um", "wall": "lower", "smooth": False, "inert_fraction": 0.0},
     "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0},
     "numerics": {"contact_elements": 0.0},
     "substrates.donor": {"inhibition_constant": "100.0 mg/L"},
@@ -655,11 +698,12 @@ def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[s
             tables["numerics"] = _beside_preset(source.numerics)
     else:
         tables = deepcopy(source) if isinstance(source, dict) else read_tables(file)
+    tables = bodies.single(tables)
     for key in unset:
         leave_out(tables, key, file, KEYS)
     for entry in overrides:
         override(tables, entry, file, KEYS)
-    return tables
+    return bodies.single(tables)
 
 
 def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
@@ -671,6 +715,7 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
     naming `file`, if the scene is not accepted.
     """
     _refuse_missing(tables, file)
+    tables = bodies.single(tables)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
     text = name.encode(errors="backslashreplace").decode()  # bytes in the name of a file
@@ -688,6 +733,7 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
 
 def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
     """Choose the contradicting key to name: the first changed one, else the first in a table."""
+    changed = [bodies.canonical(tables, key) for key in changed]
     for key in keys:
         if any(_within(key, other) or _within(other, key) for other in changed):
             return key
@@ -744,8 +790,10 @@ def scene_hash(scene: Scene) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
 
-def _without_later(section: str, table: dict) -> dict:
-    """Remove the keys of `LATER` that have their default from the table of a section."""
+def _without_later(section: str, table: Any) -> Any:
+    """Remove the keys of `LATER` that have their default from the table or tables of a section."""
+    if isinstance(table, list):
+        return [_without_later(section, each) for each in table]
     later = LATER.get(section, {})
     return {key: _without_later(f"{section}.{key}", value) if isinstance(value, dict) else value
             for key, value in table.items() if key not in later or value != later[key]}
@@ -753,8 +801,8 @@ def _without_later(section: str, table: dict) -> dict:
 
 def _at(tables: dict, key: str, default: object) -> object:
     """Return the value at a dotted key."""
-    for part in key.split("."):
-        if part not in tables:
+    for part in bodies.path_of(tables, key):
+        if not isinstance(part, int) and part not in tables:
             return default
         tables = tables[part]
     return tables

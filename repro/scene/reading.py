@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
-from repro.scene import former
+from repro.scene import bodies, former
 from repro.scene.units import (
     Quantity,
     Refused,
@@ -25,7 +25,8 @@ SCOPE = "`repro docs scope`"
 #: section is refused with the same sentence, and so is a list of tables. A noun with a number, such
 #: as aggregate2, counts as its plural. The last words belong to no section.
 NOT_MODELLED = {
-    "aggregate": ("one aggregate is modelled", "aggregates seeds colony colonies clusters"),
+    "aggregate": ("several aggregates are tables [[aggregate]]",
+                  "aggregates seeds colony colonies clusters"),
     "pore": ("one pore is modelled, a straight channel",
              "pores throat throats grains network column aquifer"),
     "substrates": ("one acceptor and one donor are modelled",
@@ -62,7 +63,8 @@ class Place:
 
 def entries(kind: type) -> dict[str, Field]:
     """The keys of a section: its fields with metadata."""
-    return {entry.name: entry for entry in fields(kind) if entry.metadata}
+    return {entry.metadata.get("key", entry.name): entry for entry in fields(kind)
+            if entry.metadata}
 
 
 def dotted(kind: type, above: str = "") -> Iterator[str]:
@@ -95,7 +97,7 @@ def read_table(kind: type, table: object, place: Place, **extra):
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].requirement)
-    read = {key: _read_entry(keys[key], table[key], place.below(key)) for key in table}
+    read = {keys[key].name: _read_entry(keys[key], table[key], place.below(key)) for key in table}
     return kind(**extra, **read)
 
 
@@ -108,6 +110,8 @@ def _refuse_unnamed(table: dict, place: Place) -> None:
 
 
 def _read_entry(entry: Field, value: object, place: Place):
+    if "key" in entry.metadata:
+        return _read_tables(entry.metadata["section"], value, place)
     if "section" in entry.metadata:
         return read_table(entry.metadata["section"], value, place)
     kind = entry.metadata["kind"]
@@ -120,6 +124,19 @@ def _read_entry(entry: Field, value: object, place: Place):
         raise place.refuse(value, kind.requirement + hint) from None
 
 
+def _read_tables(kind: type, value: object, place: Place) -> tuple:
+    """Read a table, or the tables of a list, each at the place of its name or number."""
+    tables = as_list(value)
+    if tables is None:
+        return (read_table(kind, value, place),)
+    if not tables:
+        requirement = f"a table [{place.key}] is needed, or one or more [[{place.key}]]"
+        raise place.refuse(value, requirement)
+    names = [table.get("name") if isinstance(table, dict) else None for table in tables]
+    return tuple(read_table(kind, table, place.below(label))
+                 for table, label in zip(tables, bodies.labels(names)))
+
+
 def write_table(part, units: Mapping[str, str] | None = None, above: str = "") -> dict:
     """Write a dataclass as a TOML table with units, without fields that are None.
 
@@ -128,13 +145,17 @@ def write_table(part, units: Mapping[str, str] | None = None, above: str = "") -
     """
     table = {}
     for key, entry in entries(type(part)).items():
-        value = getattr(part, key)
-        if value is not None:
+        value = getattr(part, entry.name)
+        if value is not None and value != ():
             table[key] = _write_entry(entry, value, units, above + key)
     return table
 
 
 def _write_entry(entry: Field, value, units: Mapping[str, str] | None, key: str):
+    if isinstance(value, tuple) and "section" in entry.metadata:
+        tables = [write_table(part, units, f"{place}.")
+                  for part, place in zip(value, _numbered(key, len(value)))]
+        return tables if len(tables) > 1 else tables[0]
     if "section" in entry.metadata:
         return write_table(value, units, f"{key}.")
     kind = entry.metadata["kind"]
@@ -143,13 +164,26 @@ def _write_entry(entry: Field, value, units: Mapping[str, str] | None, key: str)
     return kind.write(value, units.get(key, kind.usual_unit))
 
 
+def _numbered(key: str, count: int) -> list[str]:
+    """The keys of the units of tables in a list: the key itself for one table."""
+    return [key] if count == 1 else [f"{key}.{number}" for number in range(1, count + 1)]
+
+
 def toml(tables: dict, above: str = "") -> str:
     """Format tables as a TOML file in ASCII, values before subtables."""
-    lines = [f"[{above[:-1]}]"] if above else []
-    inner = {key: value for key, value in tables.items() if isinstance(value, dict)}
+    return _toml(tables, f"[{above[:-1]}]" if above else "", above)
+
+
+def _toml(tables: dict, head: str, above: str) -> str:
+    lines = [head] if head else []
+    inner = {key: value for key, value in tables.items() if isinstance(value, dict)
+             or isinstance(value, list) and value and isinstance(value[0], dict)}
     lines += [f"{key} = {json.dumps(value)}" for key, value in tables.items() if key not in inner]
-    parts = ["\n".join(lines)] if len(lines) > bool(above) else []
-    parts += [toml(value, f"{above}{key}.") for key, value in inner.items()]
+    parts = ["\n".join(lines)] if len(lines) > bool(head) else []
+    for key, value in inner.items():
+        name = f"{above}{key}"
+        each, head = (value, f"[[{name}]]") if isinstance(value, list) else ([value], f"[{name}]")
+        parts += [_toml(table, head, f"{name}.") for table in each]
     return "\n\n".join(parts)
 
 

@@ -1,6 +1,8 @@
 """Constraints between the keys of a scene."""
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 from repro.scene.time_table import TimeTable
@@ -36,8 +38,9 @@ Rules = Iterator[tuple[bool, dict[str, str]]]
 
 def rules(scene: "Scene") -> Rules:
     """All rules: is each broken, and the requirement of each key given the others."""
-    if scene.aggregate:
-        yield from _aggregate_rules(scene)
+    for place, aggregate in zip(scene.places, scene.aggregates):
+        yield from _aggregate_rules(scene, place, aggregate)
+    yield from _pair_rules(scene)
     if scene.flow:
         yield from _flow_rules(scene, scene.flow.head, scene.flow.mean_velocity)
         yield from _biomass_rules(scene, scene.flow)
@@ -55,104 +58,171 @@ def _not_both(other: str, value: str = "") -> str:
             f"(--unset {other} removes it)")
 
 
-def _aggregate_rules(scene: "Scene") -> Rules:
-    aggregate = scene.aggregate
+def _aggregate_rules(scene: "Scene", place: str, aggregate: "Aggregate") -> Rules:
+    """Rules of one aggregate; place: its dotted key."""
+    yield from _name_rules(scene, place, aggregate)
+    symmetry = 'pore.upper_wall = "symmetry": no aggregate sits on a plane of symmetry'
+    yield aggregate.wall == "upper" and scene.pore.upper_wall == "symmetry", {
+        f"{place}.wall": f'"lower" is needed with {symmetry}',
+        "pore.upper_wall": f'"no slip" is needed with {place}.wall = "upper"'}
     if aggregate.outline is None:
-        yield from _seed_rules(aggregate, scene.pore)
-        yield from _position_rules(aggregate, scene.pore)
+        yield from _seed_rules(place, aggregate, scene.pore)
+        yield from _position_rules(place, aggregate, scene.pore)
     else:
-        yield from _outline_rules(aggregate)
-        yield from _shape_rules(aggregate.outline, scene.pore)
+        yield from _outline_rules(place, aggregate)
+        yield from _shape_rules(place, aggregate, scene.pore)
     inert = aggregate.inert_fraction != 0 and scene.substrates is None
     requirement = "0 is needed without [substrates]: inert biomass differs in uptake alone"
-    yield inert, {"aggregate.inert_fraction": requirement}
+    yield inert, {f"{place}.inert_fraction": requirement}
 
 
-def _seed_rules(aggregate: "Aggregate", pore: "Pore") -> Rules:
+def _name_rules(scene: "Scene", place: str, aggregate: "Aggregate") -> Rules:
+    key = f"{place}.name"
+    taken = {field.name for field in fields(aggregate)}
+    yield aggregate.name in taken, {key: "another name is needed: it is a key of [aggregate]"}
+    named = [seed.name for seed in scene.aggregates if seed.name]
+    yield named.count(aggregate.name) > 1 and place != f"aggregate.{aggregate.name}", {
+        key: "another name is needed: each aggregate has its own"}
+
+
+def _pair_rules(scene: "Scene") -> Rules:
+    """Rules of the distances between aggregates at t = 0."""
+    growth = scene.growth
+    least = growth.minimum_film if growth else FINEST * scene.pore.width
+    named = "growth.minimum_film" if growth else "a thousandth of pore.width"
+    bodies = [(place, *_extent(aggregate, scene.pore.width))
+              for place, aggregate in zip(scene.places, scene.aggregates)]
+    for (one, near, reach), (other, far, extent) in combinations(bodies, 2):
+        gap = _distance(near, far) - reach - extent
+        apart = f"are {gap:.3g} um apart" if gap > 0 else "overlap or touch"
+        requirement = f"{one} and {other} {apart}; {named} ({least:g} um) or more is needed"
+        yield gap < least, {f"{place}.{key}": requirement for place in (other, one)
+                            for key in ("position", "radius", "outline")}
+
+
+def _extent(aggregate: "Aggregate", width: float) -> tuple[Outlined, float]:
+    """An aggregate as the points within a distance (um) of others: the middle of a half-disc, or
+    the corners of an outline."""
+    if aggregate.outline is None:
+        level = 0.0 if aggregate.wall == "lower" else width
+        return ((aggregate.position, level),), aggregate.radius
+    return _shifted(aggregate), 0.0
+
+
+def _distance(one: Outlined, other: Outlined) -> float:
+    """Least distance (um) between points or polygons."""
+    if len(one) == len(other) == 1:
+        return math.dist(one[0], other[0])
+    from shapely import Point, Polygon
+
+    shapes = [Polygon(points) if len(points) > 1 else Point(points[0]) for points in (one, other)]
+    return shapes[0].distance(shapes[1])
+
+
+def _shifted(aggregate: "Aggregate") -> Outlined:
+    """The points of an outline in the pore (um)."""
+    return tuple((x + aggregate.position, y) for x, y in aggregate.outline)
+
+
+def _seed_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
     radius = aggregate.radius
-    least = f"aggregate.radius ({radius:g} um) is needed"
+    least = f"{place}.radius ({radius:g} um) is needed"
     requirement = (f"less than pore.width ({pore.width:g} um) and half of pore.length "
                    f"({pore.length:g} um) is needed")
     yield radius >= pore.width, {
-        "aggregate.radius": requirement,
+        f"{place}.radius": requirement,
         "pore.width": f"more than {least}",
     }
     yield 2 * radius >= pore.length, {
-        "aggregate.radius": requirement,
+        f"{place}.radius": requirement,
         "pore.length": f"more than twice {least}",
     }
     yield radius < pore.width * FINEST, {
-        "aggregate.radius": f"a thousandth of pore.width ({pore.width:g} um) or more is needed",
+        f"{place}.radius": f"a thousandth of pore.width ({pore.width:g} um) or more is needed",
         "pore.width": f"at most a thousand times {least}",
     }
 
 
-def _position_rules(aggregate: "Aggregate", pore: "Pore") -> Rules:
-    radius = f"aggregate.radius ({aggregate.radius:g} um)"
-    position = f"aggregate.position ({aggregate.position:g} um)"
+def _position_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
+    radius = f"{place}.radius ({aggregate.radius:g} um)"
+    position = f"{place}.position ({aggregate.position:g} um)"
     half = f"half of pore.length ({pore.length:g} um)"
     yield abs(aggregate.position) + aggregate.radius >= pore.length / 2, {
-        "aggregate.position": f"less than {half} less {radius}, upstream or downstream, is needed",
-        "aggregate.radius": f"less than {half} less the distance of {position} is needed",
+        f"{place}.position": f"less than {half} less {radius}, upstream or downstream, is needed",
+        f"{place}.radius": f"less than {half} less the distance of {position} is needed",
         "pore.length": f"more than twice {radius} and the distance of {position} is needed",
     }
-    requirement = "true is accepted only with aggregate.outline"
-    yield aggregate.smooth, {"aggregate.smooth": requirement}
+    requirement = f"true is accepted only with {place}.outline"
+    yield aggregate.smooth, {f"{place}.smooth": requirement}
 
 
-def _outline_rules(aggregate: "Aggregate") -> Rules:
+def _outline_rules(place: str, aggregate: "Aggregate") -> Rules:
     radius = "" if aggregate.radius is None else f"{aggregate.radius:g} um"
     yield aggregate.radius is not None, {
-        "aggregate.radius": _not_both("aggregate.outline"),
-        "aggregate.outline": _not_both("aggregate.radius", radius),
-    }
-    requirement = "0 um is needed with aggregate.outline: its points give the position"
-    yield aggregate.position != 0, {
-        "aggregate.position": requirement,
-        "aggregate.outline": _not_both("aggregate.position", f"{aggregate.position:g} um"),
+        f"{place}.radius": _not_both(f"{place}.outline"),
+        f"{place}.outline": _not_both(f"{place}.radius", radius),
     }
 
 
-def _shape_rules(points: Outlined, pore: "Pore") -> Rules:
-    """Rules of an outline."""
+@dataclass(frozen=True)
+class _Side:
+    """An outline's wall in messages: y on it and on the opposite wall, and accepted values of y."""
+
+    own: str
+    opposite: str
+    accepted: str
+
+
+_SIDES = {"lower": _Side("y = 0 um", "upper wall (y = pore.width)", "0 < y <= pore.width ({})"),
+          "upper": _Side("y = pore.width", "lower wall (y = 0)", "0 <= y < pore.width ({})")}
+
+
+def _shape_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
+    """Rules of an outline. ``points`` have their y from its own wall."""
+    key = f"{place}.outline"
+    side = _SIDES[aggregate.wall]
+    upper = aggregate.wall == "upper"
+    drawn = _shifted(aggregate)
+    points = tuple((x, pore.width - y if upper else y) for x, y in drawn)
     first = points[0]
     last = points[-1]
-    requirement = "y = 0 um at the first and the last point is needed"
-    yield first[1] != 0 or last[1] != 0, {"aggregate.outline": requirement}
+    requirement = f"{side.own} at the first and the last point is needed"
+    yield first[1] != 0 or last[1] != 0, {key: requirement}
     requirement = "the upstream end first (x of the first point less than of the last) is needed"
-    yield first[0] >= last[0], {"aggregate.outline": requirement}
+    yield first[0] >= last[0], {key: requirement}
     for number, point in enumerate(points, 1):
         end = number in (1, len(points))
-        point_name = f"point {number} ({point[0]:g} um, {point[1]:g} um)"
-        yield from _point_rules(point_name, point, end, pore)
-    yield from _spacing_rules(points, pore.width)
+        x, y = drawn[number - 1]
+        yield from _point_rules(key, side, f"point {number} ({x:g} um, {y:g} um)", point, end, pore)
+    yield from _spacing_rules(key, side, points, pore.width)
     requirement = "a line that neither crosses nor touches itself is needed"
-    yield _crosses(points, pore.width), {"aggregate.outline": requirement}
+    yield _crosses(points, pore.width), {key: requirement}
     for one, other in nearest_edges(points, pore.width):
-        yield True, {"aggregate.outline": f"{_least(pore.width)} is needed between the lines after "
-                                          f"points {one} and {other}"}
+        yield True, {key: f"{_least(pore.width)} is needed between the lines after "
+                          f"points {one} and {other}"}
 
 
-def _point_rules(point_name: str, point: tuple[float, float], end: bool, pore: "Pore") -> Rules:
+def _point_rules(key: str, side: _Side, point_name: str, point: tuple[float, float], end: bool,
+                 pore: "Pore") -> Rules:
     x, y = point
     yield abs(x) >= pore.length / 2, {
-        "aggregate.outline": f"|x| < half of pore.length ({pore.length:g} um) at {point_name} is "
-                             "needed",
-        "pore.length": f"more than twice |x| of {point_name} of aggregate.outline is needed",
+        key: f"|x| < half of pore.length ({pore.length:g} um) at {point_name} is needed",
+        "pore.length": f"more than twice |x| of {point_name} of {key} is needed",
     }
-    requirement = f"0 < y <= pore.width ({pore.width:g} um) at {point_name} is needed"
-    yield y <= 0 and not end, {"aggregate.outline": requirement}
+    requirement = f"{side.accepted.format(f'{pore.width:g} um')} at {point_name} is needed"
+    yield y <= 0 and not end, {key: requirement}
     yield y > pore.width, {
-        "aggregate.outline": requirement,
-        "pore.width": f"y of {point_name} of aggregate.outline, or more, is needed",
+        key: requirement,
+        "pore.width": f"y of {point_name} of {key}, or more, is needed",
     }
     near = min(y, pore.width - y)
+    contact = side.opposite.partition("(")[2][:-1]
     requirement = (f"pore.width ({pore.width!r} um) over 10000, or more, is needed between "
-                   f"{point_name} and a wall that it does not touch; y = pore.width is contact")
-    yield 0 < near < pore.width * NEAREST, {"aggregate.outline": requirement}
+                   f"{point_name} and a wall that it does not touch; {contact} is contact")
+    yield 0 < near < pore.width * NEAREST, {key: requirement}
     requirement = (f"pore.width over 10000, or more, is needed between {point_name} and the pore's "
                    "end")
-    yield pore.length / 2 - abs(x) < pore.width * NEAREST, {"aggregate.outline": requirement}
+    yield pore.length / 2 - abs(x) < pore.width * NEAREST, {key: requirement}
 
 
 def _least(width: float) -> str:
@@ -160,18 +230,17 @@ def _least(width: float) -> str:
     return f"a thousandth of pore.width ({width:g} um) or more"
 
 
-def _spacing_rules(points: Outlined, width: float) -> Rules:
+def _spacing_rules(key: str, side: _Side, points: Outlined, width: float) -> Rules:
     for number, (start, end) in enumerate(zip(points, points[1:]), 1):
         near = math.dist(start, end) < width * FINEST
         requirement = f"{_least(width)} is needed from point {number} to the next"
-        yield near, {"aggregate.outline": requirement}
+        yield near, {key: requirement}
     requirement = f"{_least(width)} is needed between the first and the last point"
-    yield points[-1][0] - points[0][0] < width * FINEST, {"aggregate.outline": requirement}
+    yield points[-1][0] - points[0][0] < width * FINEST, {key: requirement}
     above = [number for number, (_, y) in enumerate(points) if y == width]
     run = above == list(range(above[0], above[0] + len(above))) if above else True
-    requirement = ("two points or more in a row, or none, on the upper wall (y = pore.width) are "
-                   "needed")
-    yield len(above) == 1 or not run, {"aggregate.outline": requirement}
+    requirement = f"two points or more in a row, or none, on the {side.opposite} are needed"
+    yield len(above) == 1 or not run, {key: requirement}
 
 
 def _crosses(points: Outlined, width: float) -> bool:
@@ -226,7 +295,7 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
         "pore.width": f"{math.sqrt((drive.permeability or 0.0) / TIGHTEST):.4g} um or less is "
                       f"needed with {permeable}",
     }
-    yield drag and scene.aggregate is None, {
+    yield drag and not scene.aggregates, {
         "flow.permeability": "[aggregate] is needed with it: it is that of the biomass"}
     requirement = '"fast", "accurate", "exact" or "sketch" is needed with'
     yield drag and scene.numerics.scheme.order == 1, {
@@ -257,7 +326,7 @@ def _boundary_rules(scene: "Scene") -> Rules:
 
 
 def _growth_rules(scene: "Scene") -> Rules:
-    alone = not (scene.substrates and scene.aggregate)
+    alone = not (scene.substrates and scene.aggregates)
     requirement = "[aggregate] and [substrates] are needed with it"
     yield alone and scene.kinetics is not None, {"kinetics": requirement}
     yield alone and scene.growth is not None, {"growth": requirement}

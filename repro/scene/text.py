@@ -44,7 +44,12 @@ def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] 
                    for letter in scene.name)
     lines = [*_comment(f"Scene {name}. {HEAD}")]
     for key, entry in entries(Scene).items():
-        lines += _table(key, entry, tables.get(key, {}), getattr(scene, key))
+        written = tables.get(key, {})
+        part = getattr(scene, entry.name)
+        several = isinstance(written, list)
+        each = zip(written, part) if several else [(written, only(part))]
+        for table, each_part in each:
+            lines += _table(key, entry, table, each_part, several)
     return "\n".join(lines) + "\n"
 
 
@@ -54,15 +59,24 @@ def titles() -> dict[str, str]:
     return {name: line.removeprefix("# ") for name, line in first.items()}
 
 
-def _table(path: str, entry: Field, written: dict, part: object) -> Iterator[str]:
+def only(part: object) -> object:
+    """A section of a scene; the only one, or None, of a section that a scene may have more than
+    once."""
+    return (part[0] if part else None) if isinstance(part, tuple) else part
+
+
+def _table(path: str, entry: Field, written: dict, part: object,
+           several: bool = False) -> Iterator[str]:
     """Lines of a section.
 
-    written: keys that the scene sets; part: the section of the scene, None if it is left out.
+    written: keys that the scene sets; part: the section of the scene, None if it is left out;
+    several: is the section one of a list?
     """
     kind = entry.metadata["section"]
     yield ""
     yield from _comment(_about(entry))
-    yield f"[{path}]" if part else f"#[{path}]"
+    head = f"[[{path}]]" if several else f"[{path}]"
+    yield head if part else f"#{head}"
     inner = {key: field for key, field in entries(kind).items() if "section" in field.metadata}
     for key, field in entries(kind).items():
         if key not in inner:

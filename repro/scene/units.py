@@ -51,6 +51,7 @@ _PRINTED = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078
                          "\u207b\u2212\u00b7\u22c5", "0123456789--**")
 _PERCENT = re.compile(rf"({_DIGITS}) *%")
 _QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
 _MOLES = re.compile(r"(?<![A-Za-z])(?:[num\u00b5\u03bc]|milli|micro|nano)?"
                     r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
 _ODD = re.compile(r"[^A-Za-z0-9\u00b5\u03bc .+*/^-]")
@@ -297,6 +298,35 @@ class Choice:
 
 
 @dataclass(frozen=True)
+class Word:
+    """A name that is a key of TOML without quotes and no number."""
+
+    default: ClassVar[dict] = {"default": None}
+    example = "upstream"
+    accepted = "a word of up to 30 letters, digits, - and _ that begins with a letter"
+    requirement = f'{accepted} is needed, such as "{example}"'
+
+    def accepts(self, value: object) -> bool:
+        """Return whether a value is a name."""
+        return (isinstance(value, str) and _NAME.fullmatch(value) is not None
+                and value.casefold() not in ("inf", "infinity", "nan"))
+
+    def read(self, value: object) -> str:
+        if not self.accepts(value):
+            raise ValueError(_wrong_type(value))
+        return str(value)
+
+    def write(self, value: str) -> str:
+        return value
+
+    def near(self, value: object) -> str:
+        return ""
+
+
+WORD = Word()
+
+
+@dataclass(frozen=True)
 class Times:
     """A list of one or more times (h), in any order; read in ascending order, each once."""
 
@@ -372,7 +402,7 @@ class Flag:
         return word if word in ("true", "false") else ""
 
 
-Kind = Quantity | Number | Choice | Times | Points | Flag
+Kind = Quantity | Number | Choice | Word | Times | Points | Flag
 
 
 def scene_key(kind: Kind, *, about: str, source: str, stated: str = "", **default):
@@ -433,6 +463,12 @@ def section(kind: type, *, about: str, source: str, **default):
     """Declare a table, whose keys are those of the dataclass `kind`."""
     default = default or {"default_factory": kind}
     return field(metadata={"section": kind, "about": about, "source": source}, **default)
+
+
+def sections(kind: type, key: str, *, about: str, source: str):
+    """Declare a table, or a list of tables, under a key: a field with a tuple of `kind`."""
+    metadata = {"section": kind, "key": key, "about": about, "source": source}
+    return field(metadata=metadata, default=())
 
 
 class SceneError(Refusal, ValueError):
@@ -570,6 +606,8 @@ def units_of(tables: object, key: str = "") -> dict[str, str]:
     units: dict[str, str] = {}
     if isinstance(tables, dict) and "table" in tables:
         tables = tables["table"]
+    if isinstance(tables, list) and any(isinstance(part, dict) for part in tables):
+        tables = {number: part for number, part in enumerate(tables, 1)}
     for name, part in tables.items() if isinstance(tables, dict) else ():
         units |= units_of(part, f"{key}.{name}" if key else str(name))
     first = (as_list(tables) or [tables])[0]

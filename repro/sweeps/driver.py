@@ -53,6 +53,11 @@ class Swept:
         """Write the value of each factor of a run."""
         return design.label(self.factors, run.point.values)
 
+    @property
+    def _numbers(self) -> list[str]:
+        """The columns of ``runs.csv`` with numbers."""
+        return [*table.COLUMNS, *table.final_columns([run.point for run in self.runs])]
+
     def to_pandas(self):
         """Return the columns of ``runs.csv`` as a ``pandas.DataFrame``.
 
@@ -68,7 +73,7 @@ class Swept:
             If pandas is not installed.
         """
         columns = table.run_columns(self.factors, self.runs)
-        kinds = dict.fromkeys({*table.COLUMNS, *table.FINAL}, float)
+        kinds = dict.fromkeys(self._numbers, float)
         return package("pandas").DataFrame(columns).astype(kinds).set_index("run")
 
     def to_xarray(self):
@@ -123,9 +128,9 @@ class Swept:
         KeyError
             If the runs have no column of this name.
         """
-        column = drawing.full_name(name, [*table.COLUMNS, *table.FINAL])
+        column = drawing.full_name(name, self._numbers)
         if not column:
-            raise KeyError(f"{name}: runs.csv has {', '.join([*table.COLUMNS, *table.FINAL])}")
+            raise KeyError(f"{name}: runs.csv has {', '.join(self._numbers)}")
         return drawing.against(self.to_pandas(), self.factors, column, self.source, ax)
 
     def __repr__(self) -> str:

@@ -83,8 +83,18 @@ NUMBERS = (
              lambda run: run.times[-1] if run.folded else np.nan, "fold"),
 )
 COLUMNS = [number.name for number in NUMBERS]
-#: The columns of a row of a run whose last values are in ``runs.csv``; ``end_h`` is their time.
-FINAL = [name for name in results.COLUMNS if name != "time_h"]
+
+
+def series_columns(points: Sequence[Point]) -> list[str]:
+    """The columns of ``timeseries.csv`` in any of the runs."""
+    return list(dict.fromkeys([*results.COLUMNS, *(name for point in points for name
+                                                   in results.column_names(point.scene))]))
+
+
+def final_columns(points: Sequence[Point]) -> list[str]:
+    """The columns of a row of a run whose last values are in ``runs.csv``; ``end_h`` is their time.
+    """
+    return [name for name in series_columns(points) if name != "time_h"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +103,7 @@ class SweepRun:
 
     times (h); relative: conductivity over its first value; biomass: area of the aggregate over that
     of the pore; all (T,), empty without a run. numbers: values of COLUMNS, None if undefined;
-    final: the last values of FINAL, likewise.
+    final: the last values of :func:`final_columns`, likewise.
     """
 
     point: Point
@@ -102,7 +112,7 @@ class SweepRun:
     relative: np.ndarray
     biomass: np.ndarray
     numbers: dict[str, float | None]
-    final: dict[str, float | None] = field(default_factory=lambda: dict.fromkeys(FINAL))
+    final: dict[str, float | None] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         values = ", ".join(str(value) for value in self.point.values)
@@ -156,7 +166,7 @@ def _read_run(point: Point, folder: Path, missing_status: str, clogged: float) -
     course = RunSeries(times, relative, biomass, series["contact"] > 0, wall, clogged,
                        status.is_fold(run_status))
     numbers = {number.name: _none_if_nan(number.reported(course)) for number in NUMBERS}
-    final = {name: _none_if_nan(series[name][-1]) for name in FINAL}
+    final = {name: _none_if_nan(values[-1]) for name, values in series.items()}
     return SweepRun(point, run_status, times, relative, biomass, numbers, final)
 
 
@@ -191,7 +201,8 @@ def write(sweep: Sweep, runs: list[SweepRun]) -> None:
     """Write ``table.csv`` and ``runs.csv``."""
     varied = [factor.column for factor in sweep.factors]
     with atomic_path(sweep.folder / "table.csv") as beside:
-        results.write_table(beside, ["run", *varied, *results.COLUMNS], list(_rows(sweep, runs)))
+        results.write_table(beside, ["run", *varied, *series_columns(sweep.points)],
+                            list(_rows(sweep, runs)))
     columns = run_columns(sweep.factors, runs)
     with atomic_path(sweep.folder / "runs.csv") as beside:
         results.write_table(beside, list(columns), list(map(list, zip(*columns.values()))))
@@ -204,7 +215,8 @@ def run_columns(factors: Sequence[Factor], runs: Sequence[SweepRun]) -> dict[str
                 for k, factor in enumerate(factors)}
     columns["status"] = [run.status for run in runs]
     columns |= {name: [run.numbers[name] for run in runs] for name in COLUMNS}
-    columns |= {name: [run.final[name] for run in runs] for name in FINAL}
+    columns |= {name: [run.final.get(name) for run in runs]
+                for name in final_columns([run.point for run in runs])}
     columns["folder"] = [f"runs/{run.point.name}" for run in runs]
     return columns
 
@@ -216,5 +228,5 @@ def _rows(sweep: Sweep, runs: list[SweepRun]) -> Iterator[list]:
             path = sweep.runs / run.point.name / "timeseries.csv"
             with path.open(encoding="utf-8", newline="") as lines:
                 for row in csv.DictReader(lines):
-                    values = [row[name] for name in results.COLUMNS]
+                    values = [row.get(name, "") for name in series_columns(sweep.points)]
                     yield [run.point.index, *run.point.values, *values]

@@ -102,7 +102,7 @@ def test_clean_channel(changes, record):
 def _clean(*changes: str) -> tuple[float, float]:
     """Relative error of the mean velocity; largest |C / supply - 1|."""
     scene = load_scene("base", changes)
-    report = next(simulate(replace(scene, aggregate=None, kinetics=None, growth=None)))
+    report = next(simulate(replace(scene, aggregates=(), kinetics=None, growth=None)))
     return abs(report.solved.flow.mean_velocity / _poiseuille(scene) - 1), _lack(report)
 
 

@@ -7,6 +7,20 @@ PERMEABLE = "tests/test_flow.py::"
 
 MUTANTS = (
     *changes(
+        "repro/fem/mesh.py",
+        ("second-aggregate-is-water",
+         "Only the first aggregate of a pore has biomass in it.",
+         "Topology.biomass",
+         "self.region > 0",
+         "self.region == 1")),
+    *changes(
+        "repro/model/meshing.py",
+        ("mesh-ends-behind-the-first",
+         "The meshed part of a pore ends behind its first aggregate.",
+         "Meshing.extent",
+         "max(lasts)",
+         "min(lasts)")),
+    *changes(
         "repro/fem/assembly.py",
         ("saddle-sign",
          "The stabilisation of the pressure enters with the sign that destabilises.",

@@ -126,9 +126,9 @@ MUTANTS = (
         "repro/results/columns.py",
         ("family-area-of-corners",
          "The reported area is that of the polygon through the corners.",
-         "",
-         "lambda scene, at: at.pore.outline.area",
-         "lambda scene, at: at.pore.outline.corners.area")),
+         "_area",
+         "at.pore.outlines[k].area",
+         "at.pore.outlines[k].corners.area")),
     *changes(
         "repro/model/transport.py",
         ("family-effluent-not-weighted",
