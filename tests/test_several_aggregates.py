@@ -144,7 +144,7 @@ def test_a_body_that_is_not_there_is_not_left_out(key, part):
 def test_bodies_keep_the_least_film(one, other, gap):
     """With [growth] it is growth.minimum_film, without a thousandth of the pore's width. Both bodies are named."""
     def tables(other, film=None):
-        growth = {"growth": {"end": "1 h", "minimum_film": f"{film!r} um"}} if film else {}
+        growth = {"growth": {"end": "1 h", "minimum_film": f"{float(film)!r} um"}} if film else {}
         kept = {key: TABLES[key] for key in ("pore", "substrates")}
         return {**kept, **growth, "aggregate": [{**one, "name": "a"}, other]}
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from repro.fem import sizing as of
 from repro.fem.outline import Outline, polygon
 from repro.fem.sizing import Sizing
-from repro.fem.walls import BOTTOM, TOP, FREE, TOP, Seat, channel_walls
+from repro.fem.walls import BOTTOM, FREE, TOP, Seat, channel_walls
 from repro.model import meshing
 from repro.model.contact_lines import surface_ends
 from repro.model.meshing import initial_outlines, resolution

@@ -347,8 +347,8 @@ MUTANTS = (
         ("stress-of-what-is-born-without",
          "Stress since t = 0 is reported for stress-free biomass.",
          "",
-         "bool(state.scene.growth) and state.pore.accumulates",
-         "bool(state.scene.growth)",
+         'NEEDS["growth"](state) and state.pore.accumulates',
+         'NEEDS["growth"](state)',
          "tests/test_rows.py::test_stress_is_reported_only_for_strain_since_the_start[1]")),
     *changes(
         "repro/report/quantities.py",
