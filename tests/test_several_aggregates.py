@@ -414,6 +414,23 @@ def test_order_names_and_walls_of_bodies_change_no_column(preset, forces, what):
     assert compared > 35
 
 
+def test_columns_of_a_body_that_has_left_are_empty(tmp_path):
+    """The first body leaves, then the second one. Sums, balances, fields and files go on without them."""
+    growth = {"end": "1 h", "wall": "bonded", "fluid_forces": "included", "bonding_strength": "500 Pa",
+              "after_detachment": "continue"}
+    scene = scene_of(growth=growth, output={}, flow={"mean_velocity": "20 m/day"}, numerics={"preset": "fast"})
+    repro.run(scene, tmp_path / "run")
+    run = repro.load_run(tmp_path / "run")
+    left, other, area = (run[f"aggregate{name}_area_um2"] for name in ("_left", "_2", ""))
+    alone = np.isnan(left) & ~np.isnan(other)
+    assert alone.any() and np.isnan(other[-1]) and area[-1] == 0.0
+    assert area[alone] == pytest.approx(other[alone]) and np.isnan(run["aggregate_2_gap_um"][alone]).all()
+    assert area == pytest.approx(np.nan_to_num(left) + np.nan_to_num(other))
+    assert np.abs(run["biomass_balance"]).max() < 1e-12
+    regions = [set(np.unique(run.fields(time)["region"])) for time in (0.0, run.time[alone][0], run.time[-1])]
+    assert regions == [{0.0, 1.0, 2.0}, {0.0, 2.0}, {0.0}]
+
+
 # ---------------------------------------------------------------- files
 
 

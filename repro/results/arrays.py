@@ -147,6 +147,13 @@ def _pressure(state: State) -> np.ndarray:
     return state.scene.growth.shear_modulus * mesh.with_middles(state.pore.pressure)[mesh.body]
 
 
+def _region(state: State) -> np.ndarray:
+    labels = state.scene.labels
+    numbers = [labels.index(body.name) + 1 if body.name in labels else number
+               for number, body in enumerate(state.pore.bodies, 1)]
+    return np.array([0, *numbers], float)[state.pore.mesh.topology.region]
+
+
 def _stretch(state: State) -> np.ndarray:
     mesh = state.pore.mesh
     stretches = [np.full(len(region.triangles), np.inf) for region in mesh.regions]
@@ -183,8 +190,8 @@ ARRAYS = (
     Array("pressure_MPa", "pressure P of the aggregate", "P (21), linear between the corners",
           _pressure, needs="stress", body=True, signed=True),
     Array("region", "aggregate (1) or fluid (0)",
-          "1 in the aggregate's triangles; of several, their number from 1",
-          lambda state: state.pore.mesh.topology.region.astype(float), cells=True),
+          "1 in the aggregate's triangles; of several, their number in the scene from 1",
+          _region, cells=True),
     Array("theta", "expansion theta", "(28)-(29), the mean over the triangle at t = 0",
           lambda state: state.mean(state.theta), needs=ORIGIN, cells=True, body=True),
     Array("J", "volume ratio J", "det dx/dX, the mean over the triangle at t = 0",

@@ -27,9 +27,10 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
     "acceptor": lambda scene, at: _solved("acceptor", at),
     "donor": lambda scene, at: _solved("donor", at),
+    "seed": lambda scene, at: bool(scene.aggregates or at.pore.bodies),
     "aggregate": lambda scene, at: bool(at.pore.bodies),
     "biomass": lambda scene, at: bool(at.pore.bodies) and scene.kinetics is not None,
-    "growth": lambda scene, at: bool(at.pore.bodies) and scene.growth is not None,
+    "growth": lambda scene, at: NEEDS["seed"](scene, at) and scene.growth is not None,
     "adhesion": lambda scene, at: (scene.growth is not None and bool(at.pore.bodies)
                                    and at.pore.accumulates and _has_adhesion(scene.growth))}
 
@@ -181,7 +182,7 @@ SERIES = (
            "the mean of C over it", lambda k, scene, at: at.solved.fluxes[k].inlet),
     Quantity("aggregate_area_um2", "area of the aggregate",
              "area inside its boundary; of several, the sum",
-             _all(_area, sum), "area", "aggregate"),
+             _all(_area, sum), "area", "seed"),
     Quantity("thickness_um", "thickness of the aggregate",
              "largest distance of its boundary from its wall; of several, the largest",
              _all(partial(_of_outline, "thickness"), max), "thickness", "aggregate"),
@@ -224,11 +225,12 @@ SERIES = (
              f"least of {STRETCH}, on edges farther from a contact line than {100 * BESIDE:g} % of "
              "the free surface's length; with the neo-Hookean energy it creases below "
              f"{CREASE:g}, and folds below {BIOT:g}",
-             lambda scene, at: least_stretched(at.pore).least, "least stretch", "growth"),
+             lambda scene, at: least_stretched(at.pore).least, "least stretch",
+             "aggregate and growth"),
     *(Quantity(f"surface_stretch_min_{axis}_um", f"place of the least surface stretch, {axis}",
                "middle of the edge with the least elastic stretch along the free surface",
                lambda scene, at, k=k: least_stretched(at.pore).place[k], f"{axis} of least stretch",
-               "growth", signed=True) for k, axis in enumerate("xy")),
+               "aggregate and growth", signed=True) for k, axis in enumerate("xy")),
     *_peak("wall_traction_max", "largest traction that a wall must bear",
            "largest (max(pull, 0)^2 + shear^2)^(1/2), means over W / 20 along the contact surface",
            "wall traction",

@@ -102,8 +102,8 @@ MUTANTS = (
         "repro/results/arrays.py",
         ("bodies-alike-in-fields",
          "Fields do not tell which aggregate a triangle belongs to.",
-         "",
-         "state.pore.mesh.topology.region.astype(float)",
+         "_region",
+         "np.array([0, *numbers], float)[state.pore.mesh.topology.region]",
          "state.pore.mesh.biomass.astype(float)",
          f"{SEVERAL}fields_have_the_body_of_each_cell[fast]")),
     *changes(
