@@ -485,6 +485,16 @@ def test_commands_know_bodies(tmp_path, capsys):
     assert set(runs["aggregate.left.radius_um"]) == {5.0, 8.0} and runs["aggregate_2_area_um2"].min() > 100
 
 
+@pytest.mark.parametrize("key, other", [("left", "1"), ("1", "left"), ("2", "2")])
+def test_one_key_of_a_body_is_not_varied_twice_or_set_besides(tmp_path, key, other):
+    """A name and a number of the same body are the same key."""
+    vary = [f"aggregate.{key}.radius=5 um, 6 um"]
+    with pytest.raises(repro.SceneError, match="one --vary of it is accepted|one vary of it is accepted"):
+        repro.sweep(scene_of(), [*vary, f"aggregate.{other}.radius=7 um, 8 um"], tmp_path / "a")
+    with pytest.raises(repro.SceneError, match="is not accepted beside"):
+        repro.sweep(scene_of(), vary, tmp_path / "b", [f"aggregate.{other}.radius=7 um"])
+
+
 def test_a_shape_is_of_one_aggregate():
     with pytest.raises(repro.SceneError, match="one aggregate at most is needed"):
         repro.simulate(scene_of(), shape=[(-5.0, 0.0), (0.0, 4.0), (5.0, 0.0)])

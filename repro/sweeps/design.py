@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,13 @@ from repro.scene import (
     Scene,
     SceneError,
     Source,
+    bodies,
     load_tables,
     parse_scene,
     scene_hash,
 )
 from repro.scene import label as label_of
-from repro.scene.files import override
+from repro.scene.files import key_of, override
 from repro.scene.reading import quote
 
 MOST_POINTS = 10_000
@@ -205,7 +206,8 @@ def points(source: Source, sets: list[str], factors: list[Factor], combinations:
     Raises SceneError, with the number of the run, if a scene is not accepted or equals another one,
     or if a key is both varied and set.
     """
-    _check_keys(sets, [factor.key for factor in factors])
+    named = partial(bodies.canonical, load_tables(source, unset=unset))
+    _check_keys([named(key_of(entry)) for entry in sets], [named(each.key) for each in factors])
     runs: list[Point] = []
     first: dict[str, int] = {}
     for index, values in enumerate(combinations, 1):
@@ -222,6 +224,7 @@ def points(source: Source, sets: list[str], factors: list[Factor], combinations:
 
 
 def _check_keys(sets: list[str], varied: list[str]) -> None:
+    """Raise SceneError if keys that are set and varied exclude each other."""
     for key, count in Counter(varied).items():
         partner = PAIRS.get(key)
         if count > 1:
@@ -229,7 +232,7 @@ def _check_keys(sets: list[str], varied: list[str]) -> None:
         if partner in varied:
             raise SceneError(f"--vary {key}: it and {partner} exclude each other; one of them is "
                              "accepted")
-        if any(entry.partition("=")[0].strip() in (key, partner) for entry in sets):
+        if any(other in (key, partner) for other in sets):
             named = f"{key} or {partner}" if partner else key
             raise SceneError(f"--set of {named}: it is not accepted beside --vary {key}, which "
                              "replaces it")
