@@ -86,7 +86,7 @@ class Meeting(RunEnd):
     >>> try:
     ...     times = [report.pore.time for report in repro.simulate("base", changes)]
     ... except repro.Meeting as end:
-    ...     print(str(end)[:24])
+    ...     print(str(end)[:23])
     aggregates 1 and 2 meet
     """
 
