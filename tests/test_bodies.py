@@ -271,7 +271,7 @@ def test_an_aggregate_that_detaches_leaves_the_pore_with_its_mass(preset, transp
         assert after == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-9)
     for ledger, following in zip(ledgers, ledgers[1:]):
         assert following.biomass_before == pytest.approx(ledger.biomass_after, rel=1e-12)
-    clean = Solver.of(scene).solve_flow(Seeding.of(replace(scene, aggregate=None)).pore(1.0).space, scene.flow)
+    clean = Solver.of(scene).solve_flow(Seeding.of(replace(scene, aggregates=())).pore(1.0).space, scene.flow)
     assert reports[-1].solved.flow.conductivity == pytest.approx(clean.conductivity, rel=1e-6)
     supplies = [kind.supply for kind in (scene.substrates.acceptor, scene.substrates.donor)]
     if transport == "quasi_steady":

@@ -220,6 +220,8 @@ def without(scene, part):
     """The scene without a part and what depends on it, or None if the scene has no such part alone."""
     section, _, kind = part.partition(".")
     parent = getattr(scene, section)
+    if section == "aggregate":
+        return replace(scene, aggregates=(), **dict.fromkeys(ABSENT[part][1])) if parent else None
     if parent is None or (kind and len(parent.modelled) == 1):
         return None
     changed = {section: replace(parent, **{kind: None}) if kind else None}

@@ -67,7 +67,7 @@ def test_growth_by_uptake_of_zero_order_runs_past_sharp_fronts():
                "substrates": {"acceptor": {"supply": "0.758 mg/L"}, "donor": {"supply": "3.77 mg/L"}},
                "kinetics": {"law": "zero order"}, "numerics": {"preset": "fast"}, "output": {"times": ["3 h"]}}
     scene = load_scene(pore_of)
-    grown = Sizes(3.0, 32 * np.pi, 25.0, 25.0, False)
+    grown = Sizes(3.0, 32 * np.pi, 25.0, 25.0, False, 50.0)
     warned = [w.text for w in widened_fronts(scene, grown)]
     pattern = r"acceptor .* ([\d.]+) % too small; numerics\.refinement = ([\d.]+) would"
     lost, advised = re.search(pattern, warned[0]).groups()

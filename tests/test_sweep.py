@@ -466,7 +466,7 @@ def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
 
 
 def test_every_end_of_the_model_is_among_the_statuses():
-    assert {repro.PoreEnd, repro.Fold, repro.Detachment} == {*RunEnd.__subclasses__()}
+    assert {repro.PoreEnd, repro.Fold, repro.Detachment, repro.Meeting} == {*RunEnd.__subclasses__()}
     assert all(any(end.fullmatch(status) for status in ENDS) for end in RUN_ENDS)
 
 

@@ -626,7 +626,8 @@ class Scene:
 LATER: dict[str, dict[str, object]] = {
     "pore": {"upper_wall": "no slip"},
     "aggregate": {"position": "0.0 um", "wall": "lower", "smooth": False, "inert_fraction": 0.0},
-    "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0},
+    "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0,
+               "after_detachment": "end"},
     "numerics": {"contact_elements": 0.0},
     "substrates.donor": {"inhibition_constant": "100.0 mg/L"},
     "kinetics": {"law": "dual Monod", "decay": "with acceptor"},
