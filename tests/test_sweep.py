@@ -423,7 +423,8 @@ ENDS = ["the aggregate reaches the pore's downstream end at t = 0 h",
         "the aggregate reaches the pore's upstream end in the step from t = 1.5 h",
         "the aggregate's surface folds in the step from t = 2 h: growth compressed it near x = 3 um",
         "the aggregate detaches at t = 1e-05 h: near x = 3, y = 0 um its wall must bear 2 MPa",
-        "the aggregate tears at t = 12 h: near x = 3, y = 0 um its tensile stress is 2 MPa"]
+        "the aggregate tears at t = 12 h: near x = 3, y = 0 um its tensile stress is 2 MPa",
+        "aggregates left and 2 meet at t = 3.5 h: near x = 3, y = 20 um the film between them is 2 um"]
 STATUSES = dict.fromkeys([COMPLETED, *ENDS], True) | dict.fromkeys(
     [f"{FAILED}x", INTERRUPTED, RUNNING, f"{ENDS[0]}!", ENDS[2].partition(":")[0], ENDS[4].partition(":")[0]], False)
 
