@@ -131,7 +131,7 @@ def test_a_wrong_entry_names_the_body_and_its_key(entry, part):
     ("aggregate = []\n", "aggregate = []: a table [aggregate] is needed, or one or more [[aggregate]]"),
     ('[[aggregate]]\nname = "a"\n[[aggregate]]\nname = "a"\nposition = "40 um"\n', "each aggregate has its own"),
     ('[[aggregate]]\n[[aggregate]]\nposition = "299 um"\n', "aggregate.2.position = \"299 um\": less than half"),
-    ('[[aggregate]]\n[[aggregate]]\nposition = "9 um"\n', "aggregate.1 and aggregate.2 overlap or touch; a thousandth")])
+    ('[[aggregate]]\n[[aggregate]]\nposition = "9 um"\n', "aggregate.1 and aggregate.2 overlap or touch; a thous")])
 def test_a_file_with_wrong_bodies_is_refused_in_one_line(tmp_path, text, part):
     path = tmp_path / "mine.toml"
     path.write_text(text)

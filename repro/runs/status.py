@@ -14,7 +14,8 @@ TIME = r"t = \d+(?:\.\d+)?(?:e[+-]\d+)? h"
 RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
                        f"(?:at|in the step from) {TIME}"),
             re.compile(f"the aggregate's surface folds (?:at|in the step from) {TIME}: growth .*"),
-            re.compile(rf"(?:the aggregate|aggregate \S+) (?:detaches|tears) at {TIME}: near x = .*"),
+            re.compile(r"(?:the aggregate|aggregate \S+) (?:detaches|tears) at "
+                       f"{TIME}: near x = .*"),
             re.compile(rf"aggregates \S+ and \S+ meet (?:at|in the step from) {TIME}(?:: .*)?"))
 
 
