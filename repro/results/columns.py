@@ -357,11 +357,22 @@ LEDGER = (
              signed=True),
 )
 
+#: The column of a ledger whose scene continues after detachment.
+DETACHED = Quantity("detached_pg_per_m", "biomass that leaves the pore at the step's end",
+                    "integral of X_A + X_I over the aggregates that detach; the biomass at the "
+                    "step's end is without it",
+                    lambda scene, step: step.detached, "detached")
+
 COLUMNS = [quantity.name for quantity in SERIES]
 #: Parts that a column of a ledger may need: does a scene have them?
 LEDGER_NEEDS: dict[str, Callable[..., bool]] = {
     name: lambda scene, name=name: name in scene.substrates.modelled for name in SUBSTRATES}
 LEDGER_COLUMNS = [quantity.name for quantity in LEDGER]
+
+
+def ledger_columns(scene: Scene) -> tuple[Quantity, ...]:
+    """Columns of the ``ledger.csv`` of a scene."""
+    return (*LEDGER, DETACHED) if scene.growth and scene.growth.continues else LEDGER
 
 
 def row(scene: Scene, instant: Report) -> dict[str, float | None]:
@@ -374,4 +385,4 @@ def row(scene: Scene, instant: Report) -> dict[str, float | None]:
 def ledger_row(scene: Scene, ledger: Ledger) -> list[float | None]:
     """One row of ``ledger.csv``: a step's balances per metre of depth."""
     return [quantity.reported(scene, ledger) if is_modelled(quantity, LEDGER_NEEDS, scene) else None
-            for quantity in LEDGER]
+            for quantity in ledger_columns(scene)]

@@ -177,7 +177,8 @@ class Recorder:
         self._write("fields.pvd", results.write_index, history.index)
         ledgers = history.ledgers + self._ledger_rows(self.state.ledgers if self.state else ())
         if ledgers:
-            self._write("ledger.csv", results.write_table, results.LEDGER_COLUMNS, ledgers)
+            names = [column.name for column in results.ledger_columns(self.scene)]
+            self._write("ledger.csv", results.write_table, names, ledgers)
         if history.before:
             self._write("before_expansion.pvd", results.write_index, history.before)
         return self.write_record(status)

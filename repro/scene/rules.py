@@ -336,6 +336,7 @@ def _growth_rules(scene: "Scene") -> Rules:
     if scene.growth:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
         yield from _strength_rules(scene.growth)
+        yield from _detachment_rules(scene.growth)
         yield from _energy_rules(scene.growth)
         yield from _mirrored_rules(scene.growth, scene.pore.upper_wall)
     if scene.growth and scene.growth.fluid_forces == "included":
@@ -389,6 +390,12 @@ def _strength_rules(growth: "Growth") -> Rules:
                              "counts from t = 0",
             "growth.new_biomass": f'"stressed" is needed with growth.{key} = {strength} MPa',
         }
+
+
+def _detachment_rules(growth: "Growth") -> Rules:
+    yield growth.continues and growth.bonding_strength is None, {
+        "growth.after_detachment": "growth.bonding_strength is needed with \"continue\"",
+        "growth.bonding_strength": 'needed with growth.after_detachment = "continue"'}
 
 
 def _energy_rules(growth: "Growth") -> Rules:

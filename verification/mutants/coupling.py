@@ -79,6 +79,18 @@ MUTANTS = (
          "zip(previous.bodies, after.bodies, produced[::-1])",
          f"{BODIES}each_aggregate_gets_the_growth_that_was_computed_for_it")),
     *changes(
+        "repro/model/substrates.py",
+        ("uptake-of-the-other-aggregate",
+         "The uptake of an aggregate is that of the other one.",
+         "uptakes",
+         "enumerate(pore.mesh.regions)",
+         "enumerate(pore.mesh.regions[::-1])"),
+        ("second-aggregate-has-the-supply",
+         "The uptake of each aggregate is reported as if its water were the supply.",
+         "uptakes",
+         "uptake(state.fields.ravel())",
+         "uptake(problem.supply)")),
+    *changes(
         "repro/model/support.py",
         ("support-uneven",
          "The traction along a sliding surface grows from one end to the other.",
