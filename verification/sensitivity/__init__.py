@@ -12,6 +12,7 @@ numbers are stored under the same scene and source.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -19,6 +20,29 @@ from pathlib import Path
 from verification.evidence.writing import load
 
 RECORD = Path(__file__).parent / "sensitivity.json"
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Whether a claim holds with several values of an input that the paper does not print.
+
+    on: the input, with its unit; holds: {value: does it hold?}.
+    """
+
+    on: str
+    holds: dict[str, bool]
+
+    @property
+    def splits(self) -> bool:
+        """Whether it holds with some values and not with others."""
+        return len(set(self.holds.values())) > 1
+
+    @property
+    def text(self) -> str:
+        """The values with which it holds, and the others."""
+        sides = (", ".join(value for value, held in self.holds.items() if held == side) or "none"
+                 for side in (True, False))
+        return "{}: holds with {}; does not with {}".format(self.on, *sides)
 
 
 @cache
@@ -49,13 +73,17 @@ def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> 
     return min(values), max(values)
 
 
-def holds_for_supplies(id: str) -> str:
-    """Describe the supplies of Figure 6 with which a claim holds, and those with which it does not."""
-    by_supply = record()["supplies"]
-    holds = {supply: all(result["claims"][id].values()) for supply, result in by_supply.items()}
-    sides = (" and ".join(supply for supply in holds if holds[supply] == side) or "none" for side in (True, False))
-    return ("the paper prints no supply for Figure 6, and 10 K_s of both is assumed; with {} K_s the claim holds, with "
-            "{} K_s it does not").format(*sides)
+def on_supplies(id: str) -> Dependence:
+    """Whether a claim holds with other supplies of Figure 6, for which the paper prints none."""
+    return Dependence("the supply of Figure 6 (K_s)", {
+        supply: all(result["claims"][id].values()) for supply, result in record()["supplies"].items()})
+
+
+def jointly() -> list[str]:
+    """The supplies of Figure 6 with which all claims hold that depend on it."""
+    supplies = record()["supplies"]
+    split = [id for id in next(iter(supplies.values()))["claims"] if on_supplies(id).splits]
+    return [supply for supply in supplies if all(on_supplies(id).holds[supply] for id in split)]
 
 
 def verified_set() -> str:
