@@ -18,7 +18,7 @@ from verification.claims import CLOSED, FEW, FEW_WORDS, Finding, at_least, at_mo
 from verification.claims.fluid_and_aggregate import FORCED as FORCED_WIDE
 from verification.claims.fluid_and_aggregate import HOURS
 from verification.claims.fluid_and_aggregate import UNFORCED as UNFORCED_WIDE
-from verification.claims.levels import COMPARED, CONVERGED, PAIRED, Level, at_level
+from verification.claims.levels import CONVERGED, FORCES, PAIRED, Level, at_level
 from verification.claims.rheology import conductivity_change, outline_shift
 from verification.claims.runs import BASE, END, PLOTTED, Body, Run, body, load_packaged, polygon, uncovered, until
 from verification.problems.runs import contact_length
@@ -96,7 +96,7 @@ def wall_traction(aggregate: Body) -> float:
 
 
 @claim("C52", "5", "the adhesion that an aggregate requires stems from fluid flow and from its displacement boundary "
-       "conditions along a surface", fine=PAIRED, beside=(), date=DEFINED)
+       "conditions along a surface", fine=FORCES, beside=(), date=DEFINED)
 def required_adhesion() -> Finding:
     """Largest traction on the walls, in the mean over W / 20, without and with the fluid's forces, on walls on which
     the aggregate slides: base at 19.2 h and wide around and after contact; and that on base at 9 h if it is bonded,
@@ -136,7 +136,7 @@ def permeable_runs(run: Run, width: float) -> tuple[Run, Run]:
 
 
 @claim("C53", "5", "the action of water on a poroelastic aggregate as body forces may lead to differences, depending "
-       "on the conditions", fine=COMPARED, beside=(), date=DEFINED)
+       "on the conditions", fine=FORCES, beside=(), date=DEFINED)
 def body_forces() -> Finding:
     """Compare runs in which the drag within a permeable aggregate acts on its shape with runs in which it does not:
     wide with a film left at 34 h and as a plug at 40 h, at constant velocity, and base at 19.2 h, at constant head."""

@@ -21,7 +21,7 @@ from repro.model.flow import MPA_PER_UM
 from repro.model.mechanics import Mechanics
 from repro.model.solid import Shape
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
-from verification.claims.levels import ABOUT_WIDE, COMPARED, CONVERGED, PAIRED, Level, at_level
+from verification.claims.levels import ABOUT_WIDE, CONVERGED, FORCES, PAIRED, Level, at_level
 from verification.claims.rheology import conductivity_change, outline_shift
 from verification.claims.runs import (
     BASE,
@@ -85,7 +85,7 @@ UNFORCED = ("wide", *until(*HOURS))
 FORCED = (*UNFORCED, 'growth.fluid_forces="included"')
 
 
-@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", fine=COMPARED, beside=())
+@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", fine=FORCES, beside=())
 def fluid_forces() -> Finding:
     """Range of rho g phi plus the largest viscous shear on the interface, against growth's shear stress and stiffness;
     and the effect of the forces on conductivity and shape in runs of wide that include them from the seed on.

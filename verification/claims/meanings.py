@@ -201,9 +201,9 @@ MEANINGS |= {
         Meaning("no mesh helps", "the paper needs another method", ("last end",))),
     "C52": more("required by", judges=("required by fluid flow, the most", "required by bonding")),
     "C53": (
+        Meaning("one difference of more than 5 %", FIRST, ("the most",)),
         Meaning("one difference beyond its bar", "may: one scene with a measured effect is enough", ("the most",),
-                {"the most": (0, inf)}),
-        Meaning("one difference of more than 5 %", FIRST, ("the most",))),
+                {"the most": (0, inf)})),
     "C54": (
         Meaning("more than half; twice as much as downgradient", "most: dictionary, the greater part", ("",)),
         Meaning("three quarters", "most: clearly more than half", ("",),
