@@ -26,6 +26,7 @@ from verification.bench.record import points
 from verification.claims import (
     FAILS,
     HOLDS,
+    NOT_JUDGED,
     PREDICTED,
     REACHES_OVER,
     VERDICTS,
@@ -65,7 +66,7 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
             "base.bars": lambda: _bars_of_base(claims),
             "inputs.set": _set_of_inputs,
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
-            "table.claims": lambda: "\n".join(map(_claim, claims)), "sentences": _sentences,
+            "table.claims": lambda: "\n".join(map(_claim, claims)), "sentences": lambda: _sentences(claims),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
 
@@ -74,8 +75,7 @@ def _set_of_inputs() -> str:
     """Whether one set of inputs gives all printed numbers of Base."""
     one_set = sensitivity.record()["one_set"]
     reached = "One" if one_set["reached"] else "No"
-    return (f"{reached} set of inputs within the rounding gives all printed numbers of Base at once: such a set takes "
-            f"{one_set['share_of_the_rounding']:.2g} times the rounding")
+    return f"{reached} set of inputs within the rounding gives all printed numbers of Base: {sensitivity.impossible()}"
 
 
 def _supplies() -> dict[str, Callable[[], str]]:
@@ -191,11 +191,15 @@ def _number(check: dict) -> str:
     return f"{check['quantity']}: paper {check['paper']}, here {here.strip()}; accepted {accepted}: {check['outcome']}"
 
 
-def _sentences() -> str:
-    """How many sentences of the paper the table lists, and how many nothing covers."""
+def _sentences(claims: list[dict]) -> str:
+    """How many sentences and fragments of the paper the table quotes, how many nothing judges, and how many are only
+    drawn. A row that rests on claims that are not judged is not judged."""
     with (ROOT / "verification" / "claims" / "sentences.csv").open(encoding="utf-8", newline="") as lines:
-        rows = list(csv.DictReader(lines))
-    return f"{len(rows)} sentences, {sum(bool(row['why']) for row in rows)} of them not judged"
+        rows = [row["covered"].split() for row in csv.DictReader(lines)]
+    unjudged = {claim["id"] for claim in claims if claim["verdict"] == NOT_JUDGED}
+    drawn = sum(bool(names) and set(names) <= set(FIGURES) for names in rows)
+    return (f"{len(rows)} sentences and fragments, {sum(set(names) <= unjudged for names in rows)} of them not judged "
+            f"and {drawn} only drawn")
 
 
 def _had_another(claim: dict) -> bool:

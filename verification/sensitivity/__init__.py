@@ -96,8 +96,22 @@ def nearest_set() -> str:
     one_set = record().get("one_set", {"reached": True})
     if one_set["reached"]:
         return ""
-    return (f"no set of inputs within the rounding of Table 1 reaches all printed numbers of base, which would take "
-            f"{one_set['share_of_the_rounding']:.1f} times the rounding; the nearest set: {_described_set()}")
+    share = one_set["share_of_the_rounding"]
+    return (f"no set of inputs within the rounding of Table 1 reaches all printed numbers of base: {impossible()}. By "
+            f"the elasticities it would take {share:.1f} times the rounding; the nearest set within it: "
+            f"{_described_set()}")
+
+
+#: The printed effluents (K_s) and F, and half a unit of their last digits; the supply (K_s).
+EFFLUENTS, RATIO, HALF_DIGIT, SUPPLY = (4.19, 6.13), 1.52, 0.005, 10.0
+
+
+def impossible() -> str:
+    """Why no inputs give the printed effluents, in closed form: F and decay against the ratio of what is consumed."""
+    _, most = in_closed_form(lambda acceptor, donor: (SUPPLY - acceptor) / (SUPPLY - donor),
+                             *((value, HALF_DIGIT) for value in EFFLUENTS))
+    return (f"at least F, and so {RATIO - HALF_DIGIT:.3f}, times as much acceptor as donor is consumed, and at most "
+            f"{most:.3f} times by the printed effluents")
 
 
 def _described_set() -> str:
