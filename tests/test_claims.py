@@ -276,6 +276,19 @@ def test_a_definition_without_a_date_before_its_values_is_refused(entry, known, 
         report.stamped(entry, known, now)
 
 
+def test_recorded_numbers_are_judged_again_by_other_meanings(monkeypatch):
+    """Only the verdict, its meanings and thresholds change; the numbers stay."""
+    evaluate.register_all()
+    claim = replace(CLAIMS["C11"], unjudged="")
+    recorded = {"id": "C11", "change": "", "rounding": "", "verdict": CONTRADICTED, "checks": [
+        report._check(SEVEN, claims.MODEL)]}
+    for names, verdict in ((("five",), CONTRADICTED), (("five", "ten"), DEGREE)):
+        monkeypatch.setitem(MEANINGS, "C11", tuple(WORDS[name] for name in names))
+        again = report.judged_again(recorded, claim)
+        assert again["verdict"] == verdict and again["checks"] == recorded["checks"]
+        assert [meaning["words"] for meaning in again["meanings"]] == [WORDS[name].words for name in names]
+
+
 KNOWN = {**DEFINED, "first_value": "2030-01-02 10:01"}
 NOW = "2030-01-02 10:03"
 

@@ -156,7 +156,7 @@ def first_length() -> Finding:
                             rests_on=CONSTRUCTION),))
 
 
-@claim("C08", "4, Plate 2", "meshed domain 210 um long at 19.4 h", about=OF_SCHEME)
+@claim("C08", "4, Plate 2", "meshed domain 210 um long at 19.4 h", about=OF_SCHEME, date="2026-11-29 16:48")
 def last_length() -> Finding:
     """Range of lengths that the rules of 3.1 allow around our aggregate: from extension to generation. The length in a
     run depends on the time of the last remesh, which has no limit as mesh and step are refined."""

@@ -19,13 +19,14 @@ run, a lower bound: `high` is null, an open end, and so is `scheme_2001`.
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
 
 from verification.claims import (
+    AS_STATED,
     DEPENDS,
     FAILS,
     HOLDS,
@@ -38,6 +39,7 @@ from verification.claims import (
     ClaimError,
     Finding,
     PaperCheck,
+    common_verdict,
 )
 from verification.claims.evaluate import unnumbered
 from verification.evidence.writing import load
@@ -224,11 +226,8 @@ def entry(row: Row) -> dict:
             "change": finding.change, "reason": row.reason, "rounding": finding.rounding, "note": finding.note,
             "dependence": finding.dependence.text if finding.dependence else "", "fixed": claim.fixed,
             "depends": bool(finding.dependence and finding.dependence.splits),
-            "meanings": [{"words": meaning.words, "origin": meaning.origin, "judges": list(meaning.judges),
-                          "bounds": {name: [*map(_finite, bounds)] for name, bounds in meaning.bounds.items()},
-                          "verdict": verdict} for meaning, verdict in zip(claim.meanings, given)],
-            "flips": flips(checks), "defined": claim.defined, "first_value": "", "former": [],
-            "other_definitions": other_definitions().get(row.id, []), "checks": checks}
+            "meanings": _meanings(claim, given), "flips": flips(checks), "defined": claim.defined, "first_value": "",
+            "former": [], "other_definitions": other_definitions().get(row.id, []), "checks": checks}
 
 
 def stamped(entry: dict, recorded: dict | None, now: str) -> dict:
@@ -253,8 +252,27 @@ def _definition(entry: dict) -> tuple:
     """The date of a definition, its quantities, their printed values with the origins of the tolerances, and the
     meanings of its words."""
     tolerances = [(check["paper"], unnumbered(check["tolerance"]["origin"])) for check in entry["checks"]]
-    meanings = [(meaning["words"], meaning["bounds"]) for meaning in entry.get("meanings", [])]
+    meanings = [(meaning["words"], meaning["bounds"]) for meaning in entry.get("meanings", [])
+                if meaning["words"] != AS_STATED.words]
     return entry["defined"], _quantities(entry), tolerances, meanings
+
+
+def judged_again(recorded: dict, claim: Claim) -> dict:
+    """A recorded claim with the verdict of the present meanings of its words, from its recorded numbers alone."""
+    checks = recorded["checks"]
+    numbers = [(check["quantity"], ends(check), ends(check["tolerance"])) for check in checks]
+    words = bool(recorded["change"]), bool(recorded["rounding"])
+    given = [meaning.verdict(numbers, *words) for meaning in claim.meanings] if checks else []
+    depends = recorded.get("depends", False)
+    return {**recorded, "dependence": recorded.get("dependence", ""), "depends": depends, "defined": claim.defined,
+            "meanings": _meanings(claim, given), "flips": flips(checks),
+            "verdict": common_verdict(given, depends) if given else NOT_JUDGED}
+
+
+def _meanings(claim: Claim, given: Iterable[str]) -> list[dict]:
+    return [{"words": meaning.words, "origin": meaning.origin, "judges": list(meaning.judges),
+             "bounds": {name: [*map(_finite, bounds)] for name, bounds in meaning.bounds.items()},
+             "verdict": verdict} for meaning, verdict in zip(claim.meanings, given)]
 
 
 def _check(check: PaperCheck, about: str) -> dict:
