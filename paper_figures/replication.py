@@ -1,10 +1,11 @@
 """The replication note, `replication.md`, and the register of the claims, `register.md`: their templates with the
 numbers of the committed records.
 
-`python -m paper_figures.replication` fills in the fields `{{...}}` of the templates from the committed records of
-`make claims` (`verification/claims/claims.json`), `make verify`, `make bench` and `make sensitivity`, the errata and
-the citation. A field names a claim and its quantity, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`; the format "off"
-gives the difference from the printed number. `{{C15 | contradicted}}` gives C15 and fails if the verdict is another.
+`python -m paper_figures.replication` fills in the fields `{{...}}` of the templates from the committed records of `make
+claims` (`verification/claims/claims.json`), `make verify`, `make bench` and `make sensitivity`, the errata and the
+citation. A field names a claim and its quantity, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`; the format "off" gives
+the difference from the printed number. `{{C15 | contradicted}}` gives C15 and fails if the verdict is another; `{{C64 |
+dependence}}` says with what it holds.
 """
 
 from __future__ import annotations
@@ -285,6 +286,8 @@ def _wrap(block: str) -> str:
 
 def _of_claim(claims: dict[str, dict], id: str, quantity: str, form: str = "") -> str:
     claim = claims[id]
+    if quantity == "dependence":
+        return claim["dependence"]
     if not form:
         verdict = claim["verdict"]
         if verdict != quantity:
