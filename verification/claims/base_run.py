@@ -36,7 +36,7 @@ from verification.claims import (
     printed,
     without_limit,
 )
-from verification.claims.levels import DEFAULT, Level, at_level
+from verification.claims.levels import BESIDE, DEFAULT, Level, at_level
 from verification.claims.runs import (
     BASE,
     END,
@@ -82,7 +82,7 @@ def velocity_at_last() -> Finding:
     return Finding(checks, change=change, reason="the velocity in this shape differs, too")
 
 
-@claim("C03", "4", "effluent acceptor 4.19 K_s, donor 6.13 K_s at 19.4 h")
+@claim("C03", "4", "effluent acceptor 4.19 K_s, donor 6.13 K_s at 19.4 h", date="2026-11-29 17:12")
 def effluents() -> Finding:
     """Flow-weighted effluents of the state that the paper plots."""
     effluents = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
@@ -156,7 +156,8 @@ def first_length() -> Finding:
                             rests_on=CONSTRUCTION),))
 
 
-@claim("C08", "4, Plate 2", "meshed domain 210 um long at 19.4 h", about=OF_SCHEME, date="2026-11-29 16:48")
+@claim("C08", "4, Plate 2", "meshed domain 210 um long at 19.4 h", about=OF_SCHEME, sizes=BESIDE,
+       date="2026-11-29 16:48")
 def last_length() -> Finding:
     """Range of lengths that the rules of 3.1 allow around our aggregate: from extension to generation. The length in a
     run depends on the time of the last remesh, which has no limit as mesh and step are refined."""

@@ -68,7 +68,7 @@ PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
 COMPARED = tuple(1.25 * 2 ** (half / 2) for half in (1, 2, 3))
 #: Sizes for runs of wide with the fluid's forces, whose slide and tractions depend on the mesh: larger elements halve
 #: them.
-FORCES = (1.0, 2**0.5, 2.0)
+FORCES = (2**0.5, 2.0, 2 * 2**0.5)
 #: Size of the scheme beside claims that compare runs of their own, which are expensive.
 BESIDE_PAIRS = (2**0.5,)
 #: Sizes and steps of the scheme, the default first.

@@ -96,7 +96,7 @@ def _in_wide() -> list[list[str]]:
     """Conductivity of wide with both forms from the seed on."""
     plain = ("wide", *until(*AROUND_CONTACT))
     rows = []
-    with at_level(Level(CONVERGED, 1.0)):
+    with at_level(Level(CONVERGED, COMPARED[0])):
         for hour in AROUND_CONTACT:
             ours, other = (at(run, hour)["conductivity_m_per_d"]
                            for run in (plain, (*plain, 'numerics.interface="traction"')))
@@ -229,7 +229,7 @@ def density_rms(scene, pore) -> float:
         around the shape of 19.2 h, and {last} um around that of 19.4 h.""")
 def plotted_state() -> Numbers:
     """Base at 19.2 h, and at 19.4 h before and after the expansion."""
-    with at_level(Level(CONVERGED, 0.5)):
+    with at_level(Level(CONVERGED, 2**-0.5)):
         before = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
         rows = [["19.2 h", *state(BASE)], ["19.4 h, before the expansion", state(BASE)[0], *before],
                 ["19.4 h, after it", *state(BASE, END)]]

@@ -129,8 +129,8 @@ def _throats() -> str:
     return f"""## Ten throats as whole runs
 
 This test says little of the law after contact: the bounds of the flow reach from {widest[0]:+.0f} to
-{widest[1]:+.0f} %, no throat spans its width, and r of {int((~resistance.holds).sum())} of {resistance.holds.size} states is
-outside the bounds of its own law.
+{widest[1]:+.0f} %, no throat spans its width, and r of {int((~resistance.holds).sum())} of {resistance.holds.size}
+states is outside the bounds of its own law.
 
 `python -m verification.network throats` runs ten throats of this network in the preset `fast`, with the head loss and
 the supplies that they have in the example. `verification/network/throats.py` has the rule that chooses them, and the
