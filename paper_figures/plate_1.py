@@ -32,8 +32,8 @@ def draw(folder: Path) -> Figure:
         _shade(panels[name], state.triangulation, state.nodes[f"{name}_mg_per_L"], f"{symbol} (mg/L)")
         style.aggregate(panels[name], state.rim, filled=False, edgecolor="white")
         inlet, outlet = (state.carried(f"{name}_mg_per_L", side) for side in (0, 1))
-        panels[name].set_title(f"electron {name}: inlet {inlet:.2f} mg/L{PRINTED_INLET[name]}, outlet {outlet:.2f} "
-                               f"(printed: {PRINTED_EFFLUENTS[name]})", fontsize=7)
+        panels[name].set_title(f"{name}: {inlet:.2f}{PRINTED_INLET[name]} in, {outlet:.2f} "
+                               f"({PRINTED_EFFLUENTS[name]}) out")
     for name, label, scale in (("active", "$X_A / X_m$ (–)", 1), ("inert", "$X_I / X_m$ (10$^{-3}$)", 1e3)):
         margin = 0.06 * np.ptp(state.rim[:, 0])
         style.plane(panels[name], (state.rim[:, 0].min() - margin, state.rim[:, 0].max() + margin),
@@ -67,7 +67,8 @@ def caption(folder: Path) -> str:
             "biomass grown since. (a, b) The substrates in the meshed part; the flow is from left to right. The "
             f"flow-weighted mean of the acceptor falls from {acceptor[0]:.2f} mg/L at the inlet of the meshed part to "
             f"{acceptor[1]:.2f} mg/L at the outlet, "
-            f"the donor from {donor[0]:.2f} to {donor[1]:.2f} mg/L (1 mg/L is 1 K_s){_start(folder, shaped)}. (c, d) "
+            f"the donor from {donor[0]:.2f} to {donor[1]:.2f} mg/L (1 mg/L is 1 K_s; the values in parentheses are "
+            f"printed){_start(folder, shaped)}. (c, d) "
             "Active and inert biomass over X_m, from which (34) leaves the density 0.1 % apart at the interface: "
             f"X_A from {active.min():.4f} to {active.max():.4f}, X_I from {inert.min():.5f} to "
             f"{inert.max():.5f}. Each panel has {CONTOURS} equally spaced contour lines and a separate colour scale.")
