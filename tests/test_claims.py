@@ -280,7 +280,7 @@ def test_recorded_numbers_are_judged_again_by_other_meanings(monkeypatch):
     """Only the verdict, its meanings and thresholds change; the numbers stay."""
     evaluate.register_all()
     claim = replace(CLAIMS["C11"], unjudged="")
-    recorded = {"id": "C11", "change": "", "rounding": "", "verdict": CONTRADICTED, "checks": [
+    recorded = {"id": "C11", "change": "", "rounding": "", "reason": "it leaks", "verdict": CONTRADICTED, "checks": [
         report._check(SEVEN, claims.MODEL)]}
     for names, verdict in ((("five",), CONTRADICTED), (("five", "ten"), DEGREE)):
         monkeypatch.setitem(MEANINGS, "C11", tuple(WORDS[name] for name in names))

@@ -263,7 +263,7 @@ def _on_another_size(most_stressed: dict[Run, Body]) -> str:
 
 
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
-       "aggregate would tear", date="2026-11-22 18:19", **ABOUT_WIDE)
+       "aggregate would tear", date="2026-11-29 17:23", **ABOUT_WIDE)
 def stress_changed_by_fluid() -> Finding:
     """Largest principal stress, in the mean over a tenth of the pore's width, with the fluid's forces and without: of
     base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. The

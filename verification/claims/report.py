@@ -71,8 +71,9 @@ class Row:
         """Why a check does not hold, or the claim is not judged; empty where all checks hold."""
         if self.verdict == NOT_JUDGED:
             return self.claim.unjudged
-        sure = not self.finding or all(check.outcome == HOLDS for check in self.checks)
-        return "" if sure and self.verdict != DEPENDS else self.finding.reason
+        if self.finding and any(check.outcome != HOLDS for check in self.checks):
+            return self.finding.reason
+        return self.finding.dependence.text if self.verdict == DEPENDS else ""
 
 
 def terminal_independence(checks: tuple[PaperCheck, ...]) -> str:
@@ -264,8 +265,10 @@ def judged_again(recorded: dict, claim: Claim) -> dict:
     words = bool(recorded["change"]), bool(recorded["rounding"])
     given = [meaning.verdict(numbers, *words) for meaning in claim.meanings] if checks else []
     depends = recorded.get("depends", False)
-    return {**recorded, "dependence": recorded.get("dependence", ""), "depends": depends, "defined": claim.defined,
-            "meanings": _meanings(claim, given), "flips": flips(checks),
+    sure = bool(checks) and all(check["outcome"] == HOLDS for check in checks)
+    reason = (recorded["dependence"] if depends else "") if sure else recorded["reason"]
+    return {**recorded, "reason": reason, "dependence": recorded.get("dependence", ""), "depends": depends,
+            "defined": claim.defined, "meanings": _meanings(claim, given), "flips": flips(checks),
             "verdict": common_verdict(given, depends) if given else NOT_JUDGED}
 
 
