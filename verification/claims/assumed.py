@@ -50,7 +50,8 @@ from verification.problems.channels import both, pair
 
 
 @claim("C60", "4", "errors created by assuming perfect symmetry are of the order of a few percent, less than the error "
-       "due to discretization", about=OF_SCHEME, sizes=BESIDE, date="2026-11-25 22:44")
+       "due to discretization", about=OF_SCHEME, sizes=BESIDE, steps=ALONE, fixed="the claim concerns the mesh",
+       date="2026-11-25 22:44")
 def symmetry() -> Finding:
     """Upstream half of base at 19.4 h in the paper's scheme: extent, growth rate and area. The error of symmetry is the
     difference of the mean of both halves from the upstream half. The error of the discretization is the distance of the

@@ -146,11 +146,14 @@ def meaning_text(meaning: dict) -> str:
 
 
 def flips(checks: list[dict]) -> list[dict]:
-    """The thresholds of the worded bounds of recorded checks: the checks with the same words, bound on the same side,
-    hold together with bounds from ``holds`` on, and one of them fails with bounds beyond ``fails``."""
+    """The thresholds of the worded bounds of recorded checks: the checks with the same words and origin, bound on the
+    same side, hold together with bounds from ``holds`` on, and one of them fails with bounds beyond ``fails``."""
     found = []
-    for words, side in dict.fromkeys((check["paper"], _side(check)) for check in checks if _side(check)):
-        bars = [ends(check) for check in checks if (check["paper"], _side(check)) == (words, side)]
+    groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    for check in checks:
+        if side := _side(check):
+            groups.setdefault((check["paper"], side, check["tolerance"]["origin"]), []).append(ends(check))
+    for (words, side, _), bars in groups.items():
         lows, highs = zip(*bars)
         least = {"at most": (max(highs), max(lows)), "at least": (min(lows), min(highs))}[side]
         found.append({"words": words, "bound": side, "holds": _finite(least[0]), "fails": _finite(least[1])})
