@@ -16,7 +16,7 @@ from repro.model import biomass
 from repro.model.kinetics import rate_law
 from verification import sensitivity
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, between, claim, without_limit
-from verification.claims.levels import ABOUT_WIDE, MANY
+from verification.claims.levels import ABOUT_WIDE, COMPARED
 from verification.claims.rheology import STRESS_FREE, conductivity_change
 from verification.claims.runs import (
     BASE,
@@ -273,7 +273,7 @@ def evenness(aggregate: Body) -> float:
     return float(rate.min() / rate.max())
 
 
-@claim("C32", "5", "minor deformation stresses, so that how new biomass is born hardly matters", fine=MANY,
+@claim("C32", "5", "minor deformation stresses, so that how new biomass is born hardly matters", fine=COMPARED,
        beside=())
 def stresses() -> Finding:
     """Largest stresses over mu_L in every row of base and wide; both with stress-free new biomass.
