@@ -42,9 +42,9 @@ def draw(base: Path, wide: Path) -> Figure:
                          clip_on=False)
             axes.annotate(f"{value:g}", (time, value), (3, -13), textcoords="offset points")
         if "{}" in column:
-            end, compared = tables[0]["time_h"][-1], states.last(base, "before_expansion")
-            axes.plot([end, end], [compared.carried(f"{name}_mg_per_L", 1) for name in ("acceptor", "donor")], "o",
-                      color=COLOURS[0], markersize=4, markerfacecolor="white", zorder=4)
+            end = tables[0]["time_h"][-1]
+            axes.scatter([end, end], compared_effluents(base), s=18, facecolors="white", edgecolors=COLOURS[0],
+                         zorder=4)
         if not log:
             axes.set_ylim(0)
         for time in _contact_times(base, wide):
@@ -57,6 +57,12 @@ def draw(base: Path, wide: Path) -> Figure:
                               (("acceptor", "-"), ("donor", "--"))], loc="upper right")
     style.number_panels(*panels)
     return figure
+
+
+def compared_effluents(base: Path) -> list[float]:
+    """Effluents (mg/L) of acceptor and donor at the end of Base before the aggregate expands."""
+    state = states.last(base, "before_expansion")
+    return [state.carried(f"{name}_mg_per_L", 1) for name in ("acceptor", "donor")]
 
 
 def _contact_times(*folders: Path) -> list[float]:
