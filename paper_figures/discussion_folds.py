@@ -34,7 +34,7 @@ def draw() -> Figure:
     panels[0].set_ylabel("supply (mg/L)")
     panels[0].plot(50.0, 10.0, "*", color=style.BLUE, markersize=8, label="Base")
     for axes in panels[1:]:
-        axes.plot(100.0, 10.0, "*", color=style.BLUE, markersize=8, label="Wide, 2.9 m/d")
+        axes.plot(100.0, 10.0, "D", color=style.RED, markersize=5, label="Wide, 2.9 m/d")
     figure.colorbar(ScalarMappable(TIMES, style.MAP), ax=panels, label="time of the fold (h)")
     handles = {label: line for axes in panels for line, label in zip(*axes.get_legend_handles_labels())}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles))
@@ -62,11 +62,20 @@ def _places(rows: list[dict], verdict: str) -> np.ndarray:
 
 def caption() -> str:
     """Caption, with the numbers of runs."""
-    rows = family.read_record().values()
+    rows = list(family.read_record().values())
     folds = [row for row in rows if row["verdict"] == family.FOLD]
     times = [row["times_h"][-1] for row in folds]
     return (f"{len(rows)} pores drawn at random, 24 widths long, with seeds of 0.1 to 0.35 widths, each run in `fast` "
             f"for three times the earliest possible time of contact. In {len(folds)} of them growth compresses the "
             f"surface of the aggregate until it folds, after {min(times):.3g} to {max(times):.3g} h; the narrowest of "
-            f"these is {min(row['width'] for row in folds):.0f} µm wide. Stars mark Base and Wide. The rows are those "
+            f"these is {min(row['width'] for row in folds):.0f} µm wide. By the drive, {_by_drive(rows)} fold: wide "
+            "pores whose aggregate starves. A fold is found where the stretch falls below a threshold of a half-space; "
+            "a margin above it was chosen from runs that failed. A blue star marks Base, and a red diamond Wide, whose "
+            "velocity lies between those of (b) and (c). The rows are those "
             "of `verification/report/pores.jsonl`, which `python -m verification.problems.family` writes.")
+
+
+def _by_drive(rows: list[dict]) -> str:
+    """The share of the folds with each drive."""
+    return ", ".join(f"{sum(row['verdict'] == family.FOLD for row in rows if row['drive'] == drive)} of "
+                     f"{sum(row['drive'] == drive for row in rows)} ({title})" for drive, title in DRIVES.items())

@@ -17,8 +17,8 @@ CLAIMS = ("C41",)
 
 COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 LABELS = ("as in the paper", *runs.VARIANTS)
-#: The curves cover this many hours before and after the first contact.
-AROUND = 4.0
+#: The curves begin this many hours before the first contact.
+BEFORE = 4.0
 
 
 @style.styled
@@ -50,12 +50,17 @@ def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
         axes.plot(table["time_h"], table["conductivity_m_per_d"], "-" if number == 0 else "--", color=colour,
                   label=label, linewidth=2.0 if number == 0 else 1.1, zorder=1 if number == 0 else 2)
     table = states.series(folders[0])
-    contact_time = min(contact(folders[0]), float(table["time_h"][-1]))
-    conductivity = table["conductivity_m_per_d"][np.abs(table["time_h"] - contact_time) <= AROUND]
+    first, end = _range(table, contact(folders[0]))
+    conductivity = table["conductivity_m_per_d"][table["time_h"] >= first]
     axes.set(title="hydraulic conductivity of the pore", xlabel="time (h)", ylabel="m/d", yscale="log",
-             xlim=(contact_time - AROUND, contact_time + AROUND),
-             ylim=(0.7 * conductivity.min(), 1.4 * conductivity.max()))
+             xlim=(first, end), ylim=(0.7 * conductivity.min(), 1.4 * conductivity.max()))
     style.grid(axes)
+
+
+def _range(table: dict[str, np.ndarray], contact_time: float) -> tuple[float, float]:
+    """The hours of both panels: from BEFORE contact to the end."""
+    end = float(table["time_h"][-1])
+    return min(contact_time, end) - BEFORE, end
 
 
 def _changes(axes: Axes, folders: tuple[Path, ...]) -> None:
@@ -67,9 +72,8 @@ def _changes(axes: Axes, folders: tuple[Path, ...]) -> None:
         reference = np.interp(table["time_h"], plain["time_h"], plain["conductivity_m_per_d"])
         axes.plot(table["time_h"], 100 * (table["conductivity_m_per_d"] / reference - 1), color=colour, label=label)
     axes.axhline(0.0, color=COLOURS[0], linewidth=0.8)
-    end = float(plain["time_h"][-1])
     axes.set(title="change of the conductivity at the same time", xlabel="time (h)", ylabel="%",
-             xlim=(min(contact(folders[0]), end) - AROUND, end))
+             xlim=_range(plain, contact(folders[0])))
     axes.set_yscale("symlog", linthresh=1.0)
     axes.set_yticks([-10, -1, 0, 1, 10, 100], labels=["-10", "-1", "0", "1", "10", "100"])
     style.grid(axes)
@@ -83,5 +87,6 @@ def caption(*folders: Path) -> str:
     return (f"Wide ({figure_6.ASSUMED}) to {tables[0]['time_h'][-1]:g} h with one change at a time: new biomass is "
             "stress-free (section 5), or the least film or contact angle of 2.3.3 is halved or doubled; C41 also "
             "chooses the fixed midpoints of the contact surfaces anew. (a) The last outlines; (b) the "
-            "conductivity around contact; (c) its change in percent, linear up to 1 % and logarithmic beyond; the "
+            f"conductivity from {BEFORE:g} h before contact on; (c) its change in percent, linear up to 1 % and "
+            "logarithmic beyond; the "
             f"peaks are contact at another time. First row in contact, and conductivity at the end: {results}.")

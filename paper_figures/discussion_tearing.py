@@ -95,8 +95,9 @@ def _sizes(axes: Axes) -> None:
 
 
 def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
-    """Outlines every EVERY hours, and the locations of the largest stress that converge."""
-    outlined = [body for body in bodies(RUN_OVERRIDES[1]) if body.pore.time % EVERY == 0]
+    """Outlines every EVERY hours, those of the same equilibrium, and the locations of the largest stress that
+    converge."""
+    outlined = outlined_bodies(forced)
     reach = np.concatenate([body.outline.points[:, 0] for body in outlined])
     ends, width = (reach.min() - figure_6.MARGIN, reach.max() + figure_6.MARGIN), outlined[0].grid.width
     style.pore(axes, ends, width, 2.5)
@@ -105,6 +106,18 @@ def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
         style.aggregate(axes, _rim(body), filled=False, edgecolor=colours.to_rgba(body.pore.time), linewidth=0.7)
     _, x, y, hours, _ = agreed(RUN_OVERRIDES[1], forced).T
     axes.scatter(x, y, c=colours.to_rgba(hours), s=16, edgecolors="black", linewidths=0.4, zorder=5)
+
+
+def outlined_bodies(forced: bool) -> list[Body]:
+    """Wide every EVERY hours, with or without the fluid's forces, as far as shape and flow converge."""
+    outlined = []
+    for body in bodies(RUN_OVERRIDES[1]):
+        if body.pore.time % EVERY == 0:
+            try:
+                outlined.append(with_fluid_forces(body) if forced and body.pore.time else body)
+            except GrowthError:
+                break
+    return outlined
 
 
 def _rim(body: Body) -> np.ndarray:

@@ -23,6 +23,7 @@ def draw(folder: Path) -> Figure:
     style.pore(axes, state.ends, state.width, 0.8)
     style.aggregate(axes, state.rim, linewidth=1.0, zorder=3, alpha=0.8)
     axes.triplot(state.triangulation, color=style.BLACK, linewidth=0.35, zorder=4)
+    axes.set_title(f"{np.ptp(state.ends):.0f} µm long (printed: 110)")
     return figure
 
 

@@ -39,11 +39,12 @@ def _law(axes: Axes) -> None:
             share = np.geomspace(*share_range(spanned), POINTS)
             resistance = added_resistance(share, 1.0, spanned, ratio)
             label = None if spanned else rf"$\lambda$ = {ratio:g}"
-            axes.plot(share, resistance.length, color=colour, linestyle="--" if spanned else "-", label=label)
+            axes.plot(share, resistance.length, color=colour, linestyle="--" if spanned else "-", label=label, zorder=3)
             if ratio == RATIO:
                 axes.fill_between(share, resistance.least, resistance.most, color=colour, alpha=0.2, linewidth=0)
     fitted = read(unseen=False)
-    axes.plot(fitted["area_over_width2"], fitted["added_length_over_width"], ".", color=style.BLACK, markersize=1.5)
+    axes.plot(fitted["area_over_width2"], fitted["added_length_over_width"], "o", color=style.FAINT, markersize=4,
+              markerfacecolor="none", markeredgewidth=0.5, zorder=2)
     axes.set(xscale="log", yscale="log", xlabel=r"area of the aggregate, $A / W^2$",
              ylabel=r"added length of empty pore, $r$ (of $W$)", title="half-discs (full) and plugs (dashed)")
     axes.legend()
@@ -71,7 +72,8 @@ def caption() -> str:
     return (f"(a) The length of empty pore with the resistance that an aggregate adds, against the aggregate's area, "
             f"for half-discs on one wall (full lines) and bodies that span the pore (dashed) at viscosity ratios of "
             f"{RATIOS[0]:g}, {RATIOS[1]:g} and {RATIOS[2]:g}. For {RATIO:g}, the law's bounds and the "
-            f"{len(fitted['grown'])} shapes of its fit are shown. The law does not depend on velocity and width of the "
-            f"pore. (b) {verdict.count} shapes that are not in the fit, drawn at random (seed {SEED}), relative to the "
+            f"{len(fitted['grown'])} shapes of its fit (grey circles) are shown. The law does not depend on "
+            f"velocity and width of the pore. (b) {verdict.count} shapes that are not in the fit, drawn at random "
+            f"(seed {SEED}), relative to the "
             f"law (0) and its bounds (1 and -1): {verdict.inside} lie within the bounds. Half of the shapes lie within "
             f"{np.median(worst):.1f} % of the law, and the worst deviates by {worst.max():.0f} %.")

@@ -17,42 +17,32 @@ RUNS = (runs.BASE,)
 CLAIMS = ("C03", "C04", "C05", "C06", "C10", "C33")
 
 CONTOURS = 20
+#: The values that the paper prints, K_s. It names the donor at the inlet, but the number is the acceptor's (E9).
+PRINTED_INLET, PRINTED_EFFLUENTS = {"acceptor": " (~7)", "donor": ""}, {"acceptor": "4.19", "donor": "6.13"}
 
 
 @style.styled
 def draw(folder: Path) -> Figure:
-    """C_A and C_D in the meshed part, X_A and X_I over the density 12 min earlier; each has a colour scale."""
+    """C_A and C_D in the meshed part, X_A and X_I over X_m; each has a colour scale."""
     state = states.last(folder, "before_expansion")
-    grown = {name: grown_since(folder, f"{name}_biomass") for name in ("active", "inert")}
     figure = style.figure(4.35)
     panels = figure.subplot_mosaic([["acceptor", "donor"], ["active", "inert"]], height_ratios=[1, 1.7])
     for name, symbol in (("acceptor", "$C_A$"), ("donor", "$C_D$")):
         style.channel(panels[name], state.ends, state.width, 1.5)
         _shade(panels[name], state.triangulation, state.nodes[f"{name}_mg_per_L"], f"{symbol} (mg/L)")
         style.aggregate(panels[name], state.rim, filled=False, edgecolor="white")
-        panels[name].set_title(f"electron {name}")
+        inlet, outlet = (state.carried(f"{name}_mg_per_L", side) for side in (0, 1))
+        panels[name].set_title(f"{name}: {inlet:.2f}{PRINTED_INLET[name]} in, {outlet:.2f} "
+                               f"({PRINTED_EFFLUENTS[name]}) out")
     for name, label, scale in (("active", "$X_A / X_m$ (–)", 1), ("inert", "$X_I / X_m$ (10$^{-3}$)", 1e3)):
         margin = 0.06 * np.ptp(state.rim[:, 0])
         style.plane(panels[name], (state.rim[:, 0].min() - margin, state.rim[:, 0].max() + margin),
                     (-margin / 2, state.rim[:, 1].max() + margin))
-        _shade(panels[name], state.aggregate, scale * grown[name], label)
+        _shade(panels[name], state.aggregate, scale * state.nodes[f"{name}_biomass"], label)
         style.aggregate(panels[name], state.rim, filled=False)
         panels[name].set_title(f"{name} biomass")
     style.number_panels(*panels.values())
     return figure
-
-
-def grown_since(folder: Path, name: str) -> np.ndarray:
-    """Biomass before the last expansion over the density X_A + X_I at the same nodes 12 min earlier, (N,).
-
-    That density differs from X_m by 0.1 % at the interface, where (34) satisfies J = theta on the average of the
-    triangles around a node. This difference is not growth and would take half of the colours. In the fluid the ratio
-    is zero.
-    """
-    shaped, _ = states.last_step(folder)
-    before, after = states.near(folder, shaped), states.last(folder, "before_expansion")
-    density = before.nodes["active_biomass"] + before.nodes["inert_biomass"]
-    return np.divide(after.nodes[name], density, out=np.zeros_like(density), where=density > 0)
 
 
 def _shade(axes: Axes, triangulation: Triangulation, values: np.ndarray, label: str) -> None:
@@ -72,14 +62,15 @@ def caption(folder: Path) -> str:
     state = states.last(folder, "before_expansion")
     acceptor = [state.carried("acceptor_mg_per_L", side) for side in (0, 1)]
     donor = [state.carried("donor_mg_per_L", side) for side in (0, 1)]
-    active, inert = (grown_since(folder, f"{name}_biomass")[state.body] for name in ("active", "inert"))
+    active, inert = (state.nodes[f"{name}_biomass"][state.body] for name in ("active", "inert"))
     return (f"Base at t = {end:g} h before the aggregate expands: the shape is that of {shaped:g} h and contains the "
             "biomass grown since. (a, b) The substrates in the meshed part; the flow is from left to right. The "
             f"flow-weighted mean of the acceptor falls from {acceptor[0]:.2f} mg/L at the inlet of the meshed part to "
             f"{acceptor[1]:.2f} mg/L at the outlet, "
-            f"the donor from {donor[0]:.2f} to {donor[1]:.2f} mg/L (1 mg/L is 1 K_s){_start(folder, shaped)}. (c, d) "
-            f"Active and inert biomass over the density of {shaped:g} h, which is X_m to 0.1 %, so that the variation "
-            f"has grown since: X_A from {active.min():.4f} to {active.max():.4f}, X_I from {inert.min():.5f} to "
+            f"the donor from {donor[0]:.2f} to {donor[1]:.2f} mg/L (1 mg/L is 1 K_s; the values in parentheses are "
+            f"printed){_start(folder, shaped)}. (c, d) "
+            "Active and inert biomass over X_m, from which (34) leaves the density 0.1 % apart at the interface: "
+            f"X_A from {active.min():.4f} to {active.max():.4f}, X_I from {inert.min():.5f} to "
             f"{inert.max():.5f}. Each panel has {CONTOURS} equally spaced contour lines and a separate colour scale.")
 
 

@@ -35,7 +35,8 @@ def draw(folder: Path) -> Figure:
     _meshed_part(meshed_part, before, after)
     colours = _close_up(near, before, after)
     figure.colorbar(colours, ax=[meshed_part, near], location="right", label="expansion θ since t = 0 (–)", aspect=40)
-    meshed_part.set_title(f"meshed part, displacements × {MESHED_PART_FACTOR}")
+    meshed_part.set_title(f"meshed part, {np.ptp(after.ends):.0f} µm long (printed: 210; C08), displacements × "
+                          f"{MESHED_PART_FACTOR}")
     near.set_title(f"aggregate: shape before (dashed) and after (line), displacements × {CLOSE_UP_FACTOR}")
     style.number_panels(meshed_part, near)
     return figure

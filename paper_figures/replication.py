@@ -1,10 +1,11 @@
 """The replication note, `replication.md`, and the register of the claims, `register.md`: their templates with the
 numbers of the committed records.
 
-`python -m paper_figures.replication` fills in the fields `{{...}}` of the templates from the committed records of
-`make claims` (`verification/claims/claims.json`), `make verify`, `make bench` and `make sensitivity`, the errata and
-the citation. A field names a claim and its quantity, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`; the format "off"
-gives the difference from the printed number. `{{C15 | contradicted}}` gives C15 and fails if the verdict is another.
+`python -m paper_figures.replication` fills in the fields `{{...}}` of the templates from the committed records of `make
+claims` (`verification/claims/claims.json`), `make verify`, `make bench` and `make sensitivity`, the errata and the
+citation. A field names a claim and its quantity, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`; the format "off" gives
+the difference from the printed number. `{{C15 | contradicted}}` gives C15 and fails if the verdict is another; `{{C64 |
+dependence}}` says with what it holds.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from verification.bench.record import points
 from verification.claims import (
     FAILS,
     HOLDS,
+    NOT_JUDGED,
     PREDICTED,
     REACHES_OVER,
     VERDICTS,
@@ -43,8 +45,10 @@ TEMPLATES = {text: text.with_stem(f"{text.stem}_template") for text in (NOTE, RE
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
 #: Names of the verdicts in the templates, and the parts of a claim that the register quotes beside its numbers.
-NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided", "unjudged")))
-WHY = {"Changed": "change", "Why not": "reason", "Inputs": "rounding", "Note": "note", "Not varied": "fixed"}
+NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "degree", "depends", "contradicted", "undecided",
+                            "unjudged")))
+WHY = {"Depends": "dependence", "Changed": "change", "Why not": "reason", "Inputs": "rounding", "Note": "note",
+       "Not varied": "fixed"}
 WIDTH = 120
 
 
@@ -59,11 +63,11 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
     claims = known["claims"]
     return {**_about(), **_verdicts(claims), **_bench(), **_errata(),
             "verify": _verified, "audit.defaults": _of_defaults, **_supplies(),
-            "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
+            "after.contact": lambda: _after_contact(claims),
             "base.bars": lambda: _bars_of_base(claims),
             "inputs.set": _set_of_inputs,
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
-            "table.claims": lambda: "\n".join(map(_claim, claims)), "sentences": _sentences,
+            "table.claims": lambda: "\n".join(map(_claim, claims)), "sentences": lambda: _sentences(claims),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
 
@@ -72,8 +76,7 @@ def _set_of_inputs() -> str:
     """Whether one set of inputs gives all printed numbers of Base."""
     one_set = sensitivity.record()["one_set"]
     reached = "One" if one_set["reached"] else "No"
-    return (f"{reached} set of inputs within the rounding gives all printed numbers of Base at once: such a set takes "
-            f"{one_set['share_of_the_rounding']:.2g} times the rounding")
+    return f"{reached} set of inputs within the rounding gives all printed numbers of Base: {sensitivity.impossible()}"
 
 
 def _supplies() -> dict[str, Callable[[], str]]:
@@ -92,13 +95,6 @@ def _supplies() -> dict[str, Callable[[], str]]:
 def _list_supplies(every: list[str], some: list[str], none: list[str]) -> str:
     return "\n".join(f"- with {label}: {', '.join(ids) or 'none'}." for label, ids in
                      (("all of these supplies", every), ("some", some), ("none, as with 10 K_s", none)))
-
-
-def _flips(claims: list[dict]) -> str:
-    """List of verdicts that change if a bound moves by the error bar of its number."""
-    changed = [(claim, flip) for claim in claims for flip in claims_record.flips(claim)]
-    return "\n".join(f"- **{flip.id}**, {flip.quantity}: {claim['verdict']}, and {flip.verdict} with a bound moved."
-                     for claim, flip in changed) or "None."
 
 
 def _after_contact(claims: list[dict]) -> str:
@@ -136,12 +132,13 @@ def _about() -> dict[str, Callable[[], str]]:
 
 
 def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
-    """Counts of the verdicts, that of the first definition of each claim, and of the printed values."""
+    """Counts of the verdicts, of the claims that had another one before, and of the printed values."""
     outcomes = [*claims_record.distinct(claims).values()]
-    verdicts_counted = [claims_record.counted(claim)["verdict"] for claim in claims]
-    counts = {f"claims.{name}": lambda verdict=verdict: str(verdicts_counted.count(verdict))
-              for verdict, name in NAMES.items()}
-    return {**counts, "claims.anew": lambda: _defined_anew(claims),
+    counts = {f"claims.{name}": lambda ids=[claim["id"] for claim in claims if claim["verdict"] == verdict]:
+              str(len(ids)) for verdict, name in NAMES.items()}
+    lists = {f"ids.{name}": lambda ids=[claim["id"] for claim in claims if claim["verdict"] == verdict]:
+             ", ".join(ids) or "none" for verdict, name in NAMES.items()}
+    return {**counts, **lists, "claims.former": lambda: str(sum(map(_had_another, claims))),
             "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
             "paper.within": lambda: str(outcomes.count(HOLDS)), "paper.outside": lambda: str(outcomes.count(FAILS)),
             "paper.open": lambda: str(outcomes.count(REACHES_OVER))}
@@ -167,15 +164,21 @@ def _span(low: float | None, high: float | None) -> str:
 
 
 def _claim(claim: dict) -> str:
-    """A row of the register: a claim with its verdict, its numbers and their widths, by its first definition, and its
-    later definitions."""
-    first, *later = claims_record.definitions(claim)
-    words = [f"*{word}:* {first[key]}" for word, key in WHY.items() if first.get(key)]
-    for each in later:
+    """A row of the register: a claim with its verdict, its numbers and their widths, the meanings of its words, the
+    thresholds at which its bounds flip, and all verdicts that it had before, with the numbers of other definitions."""
+    words = []
+    if len(claim["meanings"]) > 1:
+        words.append(f"*Meanings:* {'; '.join(map(claims_record.meaning_text, claim['meanings']))}")
+    if claim["flips"]:
+        words.append(f"*Thresholds:* {'; '.join(map(claims_record.flip_text, claim['flips']))}")
+    words += [f"*{word}:* {claim[key]}" for word, key in WHY.items() if claim.get(key)]
+    if claim["former"]:
+        words.append(f"*Former verdicts:* {claims_record.former_text(claim)}")
+    for each in claim["other_definitions"]:
         numbers = "; ".join(map(_number, each["checks"]))
-        words.append(f"*Redefined* on {each['defined']}, after its values were known: {each['verdict']}; {numbers}")
-    return markdown_row((f"**{claim['id']}**", claim["where"], claim["claim"], first["verdict"],
-                         "<br>".join(map(_number, first["checks"])) or "-", "<br>".join(words) or "-"))
+        words.append(f"*Defined on {each['defined']}* ({each['words']}): {each['verdict']}; {numbers}")
+    return markdown_row((f"**{claim['id']}**", claim["where"], claim["claim"], claim["verdict"],
+                         "<br>".join(map(_number, claim["checks"])) or "-", "<br>".join(words) or "-"))
 
 
 def _number(check: dict) -> str:
@@ -189,17 +192,20 @@ def _number(check: dict) -> str:
     return f"{check['quantity']}: paper {check['paper']}, here {here.strip()}; accepted {accepted}: {check['outcome']}"
 
 
-def _sentences() -> str:
-    """How many sentences of the paper the table lists, and how many nothing covers."""
+def _sentences(claims: list[dict]) -> str:
+    """How many sentences and fragments of the paper the table quotes, how many nothing judges, and how many are only
+    drawn. A row that rests on claims that are not judged is not judged."""
     with (ROOT / "verification" / "claims" / "sentences.csv").open(encoding="utf-8", newline="") as lines:
-        rows = list(csv.DictReader(lines))
-    return f"{len(rows)} sentences, {sum(bool(row['why']) for row in rows)} of them not judged"
+        rows = [row["covered"].split() for row in csv.DictReader(lines)]
+    unjudged = {claim["id"] for claim in claims if claim["verdict"] == NOT_JUDGED}
+    drawn = sum(bool(names) and set(names) <= set(FIGURES) for names in rows)
+    return (f"{len(rows)} sentences and fragments, {sum(set(names) <= unjudged for names in rows)} of them not judged "
+            f"and {drawn} only drawn")
 
 
-def _defined_anew(claims: list[dict]) -> str:
-    """The claims whose definitions have more than one verdict, with the first and the last."""
-    return ", ".join(f"{claim['id']} {claims_record.describe_verdicts(claim)}" for claim in claims
-                     if len({each["verdict"] for each in claims_record.definitions(claim)}) > 1)
+def _had_another(claim: dict) -> bool:
+    """Whether a claim had another verdict before."""
+    return any(each["verdict"] != claim["verdict"] for each in claim["former"])
 
 
 def _figure(name: str) -> str:
@@ -280,8 +286,10 @@ def _wrap(block: str) -> str:
 
 def _of_claim(claims: dict[str, dict], id: str, quantity: str, form: str = "") -> str:
     claim = claims[id]
+    if quantity == "dependence":
+        return claim["dependence"]
     if not form:
-        verdict = claims_record.counted(claim)["verdict"]
+        verdict = claim["verdict"]
         if verdict != quantity:
             raise LookupError(f"{id} is {verdict}, not {quantity}")
         return id

@@ -19,8 +19,8 @@ PAGE = 6.9
 RESOLUTION = 250
 LAYOUT_PASSES = 2
 
-#: Okabe and Ito's colours, named by their use.
-BLUE, RED = "#0072B2", "#D55E00"
+#: Okabe and Ito's colours, with a red in place of their vermilion, named by their use.
+BLUE, RED = "#0072B2", "#C1272D"
 SKY, BLACK = "#56B4E9", "#000000"
 FLUID, WALL = "#E6F1F9", "#555555"
 BIOMASS, RIM = "#F3D08B", "#7A4A00"

@@ -41,6 +41,10 @@ def draw(base: Path, wide: Path) -> Figure:
             axes.scatter(time, value, marker="x", s=36, color=style.BLACK, linewidths=1.4, zorder=3,
                          clip_on=False)
             axes.annotate(f"{value:g}", (time, value), (3, -13), textcoords="offset points")
+        if "{}" in column:
+            end = tables[0]["time_h"][-1]
+            axes.scatter([end, end], compared_effluents(base), s=18, facecolors="white", edgecolors=COLOURS[0],
+                         zorder=4)
         if not log:
             axes.set_ylim(0)
         for time in _contact_times(base, wide):
@@ -53,6 +57,12 @@ def draw(base: Path, wide: Path) -> Figure:
                               (("acceptor", "-"), ("donor", "--"))], loc="upper right")
     style.number_panels(*panels)
     return figure
+
+
+def compared_effluents(base: Path) -> list[float]:
+    """Effluents (mg/L) of acceptor and donor at the end of Base before the aggregate expands."""
+    state = states.last(base, "before_expansion")
+    return [state.carried(f"{name}_mg_per_L", 1) for name in ("acceptor", "donor")]
 
 
 def _contact_times(*folders: Path) -> list[float]:
@@ -71,4 +81,5 @@ def caption(base: Path, wide: Path) -> str:
             f"{figure_6.ASSUMED}). Crosses: the values that the paper prints of Base; at 19.4 h it plots the shape of "
             f"19.2 h (E12). (a) Hydraulic conductivity of the whole pore, which falls by a factor of {falls[0]:.3g} "
             f"in Base and {falls[1]:.3g} in Wide; (b) mean velocity; (c) flow-weighted concentrations of acceptor "
-            f"(full) and donor (dashed) at the outlet; (d) area of the aggregate.{dotted}")
+            "(full) and donor (dashed) at the outlet, and, as circles, those of Base at 19.4 h before the aggregate "
+            f"expands, the state that the paper plots; (d) area of the aggregate.{dotted}")

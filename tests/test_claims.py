@@ -10,17 +10,24 @@ from reference import layered_channel
 from verification import claims, sensitivity
 from verification.claims import (
     CHANGED,
+    CLAIMS,
     CONTRADICTED,
+    DEGREE,
+    DEPENDS,
+    MEANINGS,
     NOT_JUDGED,
     REPRODUCED,
     UNDECIDED,
     VERDICTS,
     WITHIN_ROUNDING,
     ClaimError,
+    Dependence,
     Finding,
+    Meaning,
     after_contact,
     assumed,
     discussed,
+    evaluate,
     folds,
     permeability,
     report,
@@ -52,8 +59,54 @@ FAILED, DOUBTED_FAILURE = sure(BAD, 0.1), sure(BAD, 0.3)
     ((SATISFIED, FAILED), {"rounding": "k 9.31"}, WITHIN_ROUNDING),
 ])
 def test_each_verdict_follows_from_the_checks_and_their_bars(checks, words, verdict):
-    assert Finding(checks, reason="it leaks", **words).verdict == verdict
-    assert verdict in VERDICTS and len(VERDICTS) == 6
+    assert Finding(checks, reason="it leaks", **words).verdict() == verdict
+    assert verdict in VERDICTS and len(VERDICTS) == 8
+
+
+SEVEN = sure(claims.at_most("apart (%)", "a few percent", 7.0, 5.0, "up to five"), 0.5)
+WORDS = {"five": Meaning("up to 5 %", "first"),
+         "three": Meaning("up to 3 %", "few", ("apart",), {"apart": (-math.inf, 3)}),
+         "ten": Meaning("up to 10 %", "order", ("apart",), {"apart": (-math.inf, 10)}),
+         "other": Meaning("the speed alone", "first", ("speed",))}
+
+
+@pytest.mark.parametrize("names, holds, verdict", [
+    (("five", "three"), {}, CONTRADICTED), (("ten", "other"), {}, REPRODUCED), (("five", "ten"), {}, DEGREE),
+    (("ten", "five"), {}, DEGREE), (("five", "three"), {"5": True, "20": False}, DEPENDS),
+    (("ten",), {"5": True, "20": True}, REPRODUCED), (("five",), {"5": False, "20": False}, CONTRADICTED)])
+def test_a_verdict_follows_from_all_meanings_of_the_words(names, holds, verdict):
+    """Meanings that differ make it a matter of degree; a range in which it holds in a part makes it depend on it."""
+    finding = Finding((SEVEN, SATISFIED), reason="it leaks", dependence=Dependence("the supply", holds))
+    assert finding.verdict(tuple(WORDS[name] for name in names)) == verdict
+
+
+@pytest.mark.parametrize("meaning", [Meaning("none", "", ("area",)), Meaning("bound", "", ("",), {"area": (0, 1)})])
+def test_a_meaning_that_names_no_quantity_is_refused(meaning):
+    with pytest.raises(ClaimError, match="no quantity has the name"):
+        Finding((SATISFIED,)).verdict((meaning,))
+
+
+def test_a_threshold_is_that_of_all_numbers_with_the_same_words():
+    """Up to the largest upper end the bound holds, and under the largest lower end it fails; for lower bounds the
+    reverse; printed numbers have none."""
+    few = [sure(claims.at_most(f"{name} apart (%)", "a few", value, 5.0, "up to five"), half)
+           for name, value, half in (("rim", 2.0, 1.5), ("core", 3.0, 0.25))]
+    most = [sure(claims.at_least(f"{name} (%)", "most", value, 50.0, "half"), 1.0) for name, value in (("up", 87.0),)]
+    recorded = [report._check(check, claims.MODEL) for check in (*few, *most, SATISFIED)]
+    assert report.flips(recorded) == [{"words": "a few", "bound": "at most", "holds": 3.5, "fails": 2.75},
+                                      {"words": "most", "bound": "at least", "holds": 86.0, "fails": 88.0}]
+    assert report.flip_text(report.flips(recorded)[0]) == '"a few" as at most 3.5 holds, and fails under 2.75'
+
+
+def test_every_claim_with_words_of_degree_has_two_to_four_meanings():
+    """Other claims are not judged, or have only printed numbers, closed forms, places and signs, or depend on their
+    scene. The first meaning has the bounds of the claim's numbers."""
+    evaluate.register_all()
+    assert all(2 <= len(meanings) <= 4 and not meanings[0].bounds for meanings in MEANINGS.values())
+    assert all(meaning.words and meaning.origin for meanings in MEANINGS.values() for meaning in meanings)
+    assert set(MEANINGS) <= {id for id, claim in CLAIMS.items() if not claim.unjudged}
+    stated = {id for id, claim in CLAIMS.items() if not claim.unjudged} - set(MEANINGS)
+    assert stated == {"C01", "C04", "C05", "C06", "C07", "C08", "C10", "C17", "C23", "C27", "C28", "C37", "C48"}
 
 
 @pytest.mark.parametrize("end, low, high, outcome", [
@@ -97,9 +150,17 @@ CREASED = np.exp(100 * (1 - 0.647) / 8)
 VALUES = {
     "steepness": (lambda: permeability.steepness(("wide",)),
                   1 + np.log(20) / np.log(1.1)),
-    "steepness over a layer's": (lambda: permeability.as_layers_fall(("wide",), "wide").value, (
+    "steepness over a layer's": (lambda: permeability.slopes(("wide",), "wide")[1].value, (
         1 + np.log(20) / np.log(1.1)) * np.log(1.1) / np.log(layered_channel.gradient(1.0, 9100 / 6e4, 2000.0)
                                                             / layered_channel.gradient(1.0, 9100 / 6.6e4, 2000.0))),
+    "slope of a layer in a pore twice as long": (
+        lambda: permeability.layer_slope(("wide",), 12.0) * np.log(1.1),
+        np.log(layered_channel.gradient(1.0, 9100 / 12e4, 2000.0)
+               / layered_channel.gradient(1.0, 9100 / 13.2e4, 2000.0))),
+    "conductivity of a pore twice as long": (lambda: permeability.at_length(0.2, SCENE, 12.0), 1 / (1 + 4 / 2)),
+    "filled in a pore twice as long": (
+        lambda: discussed.filled_at(1 / (1 + (AREA[14] / 50 - 1) / 2), ("wide",), 12.0), AREA[14] / 12e4),
+    "time to which it is smooth": (lambda: folds.smooth_until(FOLDING), 35.3),
     "filled at a reduction": (lambda: discussed.filled_at(0.02), 50 / 0.02 / 6e4),
     "shares": (lambda: discussed.shares(SYNTHETIC), AREA / 20000),
     "share of the aggregate": (lambda: discussed.share_of_aggregate(0.1), 6e3 / 20000),
@@ -157,44 +218,49 @@ def bounds_of(entry):
 
 
 def test_the_recorded_verdicts_follow_from_the_recorded_numbers(record):
-    """The test computes every outcome and verdict from intervals and tolerances alone. A printed number holds if its
-    interval contains the bar; only statements in words have other tolerances."""
-    for entry in (definition for known in record for definition in report.definitions(known)):
-        for check in entry["checks"]:
-            bounds, printed = bounds_of(check["tolerance"]), claims.interval(check["paper"])
-            assert claims.outcome_of(bounds_of(check), bounds) == check["outcome"], check["quantity"]
-            assert (check.get("paper_low"), check.get("paper_high")) == (printed or (None, None)), check["quantity"]
-            assert printed in (None, bounds), check["quantity"]
-        outcomes = {check["outcome"] for check in entry["checks"]}
-        follows = claims.verdict_of(outcomes, bool(entry["change"]), bool(entry["rounding"]))
-        verdict = follows if outcomes else NOT_JUDGED
-        assert entry["verdict"] == verdict, entry["defined"]
+    """The test computes every outcome and verdict from intervals, tolerances and meanings alone. A printed number holds
+    if its interval contains the bar; only statements in words have other tolerances."""
+    for entry in record:
+        for definition in (entry, *entry["other_definitions"]):
+            for check in definition["checks"]:
+                bounds, printed = bounds_of(check["tolerance"]), claims.interval(check["paper"])
+                assert claims.outcome_of(bounds_of(check), bounds) == check["outcome"], check["quantity"]
+                assert (check.get("paper_low"), check.get("paper_high")) == (printed or (None, None)), check["quantity"]
+                assert printed in (None, bounds), check["quantity"]
+        words = bool(entry["change"]), bool(entry["rounding"])
+        numbers = [(check["quantity"], bounds_of(check), bounds_of(check["tolerance"])) for check in entry["checks"]]
+        given = [Meaning(meaning["words"], meaning["origin"], tuple(meaning["judges"]), {
+            name: bounds_of(dict(zip(("low", "high"), ends))) for name, ends in meaning["bounds"].items()})
+            .verdict(numbers, *words) for meaning in entry["meanings"]]
+        assert given == [meaning["verdict"] for meaning in entry["meanings"]], entry["id"]
+        verdict = claims.common_verdict(given, entry["depends"]) if given else NOT_JUDGED
+        assert entry["verdict"] == verdict, entry["id"]
+        assert entry["flips"] == report.flips(entry["checks"]), entry["id"]
 
 
-def test_a_claim_counts_with_its_first_definition(record):
-    """Claims that were redefined after their values had been seen keep all definitions."""
-    redefined = {entry["id"]: entry for entry in record if entry["other_definitions"]}
-    assert {"C13", "C39", "C41", "C46"} <= redefined.keys()
-    for entry in redefined.values():
-        first, *later = report.definitions(entry)
-        if entry["verdict"] == NOT_JUDGED:
-            assert (first, later) == (entry, []) and report.describe_verdicts(entry) == NOT_JUDGED
-            continue
-        assert report.counted(entry) is first and all(first["defined"] < each["defined"] for each in later)
+def test_every_verdict_that_a_claim_ever_had_is_in_its_row(record):
+    """All definitions that were replaced have their verdicts among the former ones. Those claims that a reader would
+    take for never judged are among them."""
+    rows = {entry["id"]: entry for entry in record}
+    for entry in record:
+        former = [(each["defined"], each["verdict"]) for each in entry["former"]]
+        assert {(each["defined"], each["verdict"]) for each in entry["other_definitions"]} <= set(former), entry["id"]
         assert all(each["replaced_because"] and each["words"] for each in entry["other_definitions"])
-        assert f"{first['verdict']} (as redefined: {later[-1]['verdict']})" == report.describe_verdicts(entry)
-    assert [report.counted(redefined[id])["verdict"] for id in ("C13", "C39", "C41")] == [CONTRADICTED] * 3
+        assert all(verdict in report.former_text(entry) for _, verdict in former)
+    first = {"C33": CONTRADICTED, "C34": REPRODUCED, "C39": CONTRADICTED, "C40": UNDECIDED, "C42": REPRODUCED,
+             "C44": REPRODUCED, "C45": CONTRADICTED}
+    assert {id: rows[id]["former"][0]["verdict"] for id in first} == first
 
 
 def test_a_definition_is_dated_before_its_first_value(record):
     """No definition in the record is later than its first value, and none of the rule's time is as late."""
     for entry in record:
-        for definition in report.definitions(entry):
+        for definition in (entry, *entry["other_definitions"]):
             times = definition["defined"], definition["first_value"]
             assert times[0] < times[1] or times[0] == times[1] < report.RULE_SINCE, entry["id"]
 
 
-DEFINED = {"id": "C01", "defined": "2030-01-02 10:00", "checks": [
+DEFINED = {"id": "C01", "defined": "2030-01-02 10:00", "verdict": REPRODUCED, "former": [], "checks": [
     {"quantity": "speed at 3 h", "paper": "2.9", "tolerance": {"origin": "half a unit"}}]}
 OTHER = {**DEFINED, "checks": [{**DEFINED["checks"][0], "quantity": "speed of another shape"}]}
 
@@ -210,13 +276,29 @@ def test_a_definition_without_a_date_before_its_values_is_refused(entry, known, 
         report.stamped(entry, known, now)
 
 
-def test_no_recorded_verdict_flips_to_its_opposite(record):
-    """If a bound moves by the bar of its number, a decided verdict becomes undecided at most, or an undecided one
-    decided. At most a tenth of the decided verdicts become undecided."""
-    verdicts = {entry["id"]: entry["verdict"] for entry in record}
-    flips = [flip for entry in record for flip in report.flips(entry)]
-    assert all(UNDECIDED in (flip.verdict, verdicts[flip.id]) for flip in flips), flips
-    assert len({flip.id for flip in flips if verdicts[flip.id] != UNDECIDED}) <= len(record) // 10
+def test_recorded_numbers_are_judged_again_by_other_meanings(monkeypatch):
+    """Only the verdict, its meanings and thresholds change; the numbers stay."""
+    evaluate.register_all()
+    claim = replace(CLAIMS["C11"], unjudged="")
+    recorded = {"id": "C11", "change": "", "rounding": "", "reason": "it leaks", "verdict": CONTRADICTED, "checks": [
+        report._check(SEVEN, claims.MODEL)]}
+    for names, verdict in ((("five",), CONTRADICTED), (("five", "ten"), DEGREE)):
+        monkeypatch.setitem(MEANINGS, "C11", tuple(WORDS[name] for name in names))
+        again = report.judged_again(recorded, claim)
+        assert again["verdict"] == verdict and again["checks"] == recorded["checks"]
+        assert [meaning["words"] for meaning in again["meanings"]] == [WORDS[name].words for name in names]
+
+
+KNOWN = {**DEFINED, "first_value": "2030-01-02 10:01"}
+NOW = "2030-01-02 10:03"
+
+
+@pytest.mark.parametrize("entry, former", [
+    (DEFINED, []), ({**DEFINED, "verdict": DEGREE}, [REPRODUCED]),
+    ({**OTHER, "defined": "2030-01-02 10:02"}, [REPRODUCED])])
+def test_a_verdict_that_changes_stays_among_the_former_ones(entry, former):
+    """It also stays if the definition changes and not the verdict."""
+    assert [each["verdict"] for each in report.stamped(entry, KNOWN, NOW)["former"]] == former
 
 
 def test_bars_are_as_narrow_as_required(record):

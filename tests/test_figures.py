@@ -64,7 +64,7 @@ def test_every_figure_is_drawn_and_described(quick):
     assert {p.name for p in quick.iterdir()} == {f"{n}.png" for n in MODULES} | {"index.html", "manifest.json"}
     root = ElementTree.fromstring((quick / "index.html").read_text(encoding="utf-8"))
     text = " ".join(" ".join(root.itertext()).split())
-    verdicts = {claim["id"]: report.describe_verdicts(claim) for claim in report.read()}
+    verdicts = {claim["id"]: claim["verdict"] for claim in report.read()}
     for module in MODULES.values():
         expected = [module.TITLE, *(request.command() for request in module.RUNS)]
         for id in module.CLAIMS:
@@ -88,10 +88,13 @@ def unlike(monkeypatch):
     return tables
 
 
-def test_a_curve_matches_its_legends(unlike):
-    """The colour marks the run, and the line style marks the substrate."""
+def test_a_curve_matches_its_legends(unlike, monkeypatch):
+    """The colour marks the run, and the line style marks the substrate. Circles mark the state that is compared."""
     module, folders = MODULES["time_series"], dict(zip(("Base", "Wide"), unlike))
+    monkeypatch.setattr(module, "compared_effluents", lambda folder: [4.5, 6.5])
     panels = module.draw(*folders.values()).axes
+    end = unlike[folders["Base"]]["time_h"][-1]
+    assert [[end, 4.5], [end, 6.5]] in [drawn.get_offsets().tolist() for drawn in panels[2].collections]
     entries = [(line, text.get_text()) for k in (0, 2) for legend in [panels[k].get_legend()]
             for line, text in zip(legend.get_lines(), legend.get_texts())]
     tables = {line.get_color(): unlike[folders[name]] for line, name in entries[:2]}

@@ -99,3 +99,20 @@ def test_page_and_diagrams_are_those_of_the_record(record, tmp_path):
     pictures = tmp_path / "one.svg", tmp_path / "outlines.svg"
     driver.write(record, *pictures)
     assert [file.read_bytes() for file in pictures] == [driver.TARGET.read_bytes(), driver.OUTLINES.read_bytes()]
+
+
+def test_no_inputs_give_the_printed_effluents():
+    """The closed form: the least F exceeds the largest ratio that the printed effluents admit."""
+    assert "1.515, times" in sensitivity.impossible() and "1.505 times" in sensitivity.impossible()
+    assert 1.515 > (10 - 4.185) / (10 - 6.135)
+
+
+def test_claims_that_depend_on_the_supply_hold_jointly_with_one(monkeypatch):
+    supplies = {"5": {"A": True, "B": False, "C": True}, "10": dict.fromkeys("ABC", True),
+                "20": {"A": False, "B": True, "C": True}}
+    record = {"supplies": {supply: {"claims": {id: {"number": holds} for id, holds in claims.items()}}
+                           for supply, claims in supplies.items()}}
+    monkeypatch.setattr(sensitivity, "record", lambda: record)
+    assert sensitivity.jointly() == ["10"] and not sensitivity.on_supplies("C").splits
+    text = sensitivity.on_supplies("A").text
+    assert text == "the supply of Figure 6 (K_s): holds with 5, 10; does not with 20"

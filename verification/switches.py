@@ -70,7 +70,8 @@ CHOICES = {
     "full pore": Switch("extent", "central part (3.1)", "full pore", 'numerics.extent="full"', False,
                         "inlet and outlet at most 1.5 W away, against the pore's ends; in the converged solution, "
                         "because the meshes differ", False),
-    "traction": Switch("interface", "Laplacian form", "traction form", 'numerics.interface="traction"', note="[E2]"),
+    "traction": Switch("interface", "Laplacian form", "traction form", 'numerics.interface="traction"',
+                       note="[E2]; base alone: after contact in wide the conductivity changes by several percent"),
     "fluid forces": Switch("fluid forces", "neglected", "included", 'growth.fluid_forces="included"',
                            note="(20), (22), C26"),
     "mean inlet": Switch("inlet condition (11)", "u_x(y)", "u_ave", exchange(inlet="mean"), note="[E4]"),
@@ -164,14 +165,15 @@ def one_state(aggregate: Body, alternative: Scene) -> dict[str, float]:
 
 
 def run_columns(run: Run) -> Columns:
-    """Columns of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and
-    "lean", the middle between the tips divided by half of their distance."""
+    """Columns of a run's rows: "time" h, "velocity" m/d, "area" um2, effluents "acceptor" and "donor", "drift", largest
+    |(X_A + X_I) / X_m - 1|, and "lean", the middle between the tips divided by half of their distance."""
     return _row_columns(runs.series(*run))
 
 
 def _row_columns(rows: Columns) -> Columns:
     upstream, downstream = rows["upstream_um"], rows["downstream_um"]
     return {"time": rows["time_h"], "velocity": rows["mean_velocity_m_per_d"], "area": rows["aggregate_area_um2"],
+            "acceptor": rows["effluent_acceptor_mg_per_L"], "donor": rows["effluent_donor_mg_per_L"],
             "drift": np.maximum(1 - rows["biomass_density_min"], rows["biomass_density_max"] - 1),
             "lean": (upstream + downstream) / (downstream - upstream)}
 

@@ -6,7 +6,8 @@ date when it was set. Each number has three widths: printing, numerics (a bar fr
 inputs, because Table 1 is rounded too (`verification.sensitivity`).
 
 Claims about **the model** are judged with a converged solution; the range of the paper's own scheme stands beside it.
-Claims about **the scheme** are judged with the scheme. A verdict follows from the outcomes of the checks alone:
+Claims about **the scheme** are judged with the scheme. Words have several meanings (`meanings`). Each gives a verdict,
+which follows from the outcomes of the checks alone:
 
     all hold                                                                 reproduced
     all hold, something was changed against the paper                        reproduced with a stated change
@@ -14,24 +15,31 @@ Claims about **the scheme** are judged with the scheme. A verdict follows from t
     of Table 1 gives every printed number of base at once                    reproduced within the rounding of Table 1
     some fail beyond their bars                                              contradicted; the finding says why
     no check fails, but a bar reaches over a bound                           undecided
-    no value could contradict the statement; the claim says why              not judged
 
-If the paper says that something may or could happen, the claim holds if it happens in at least one of the scenes that
-are tried. If the paper says that it depends on the conditions, it must also not happen in another scene.
+and the claim has
+
+    the verdict of its meanings                                              if all of them give the same
+    a matter of degree                                                       if they differ; the numbers say of which
+    depends on what the paper does not print                                 if it holds in a part of the range tried
+    not judged                                                               if no value could contradict it
+
+Each worded bound has the threshold at which its outcome flips, computed from the bars (`report.flips`). If the paper
+says that something may or could happen, one scene with a measured effect is enough, and its absence in another scene
+contradicts nothing.
 
 A definition carries the date when it was written, which is before its first value. If the definition of a claim changes
-after its values are known, its other definitions stay in `other_definitions.json` with their outcomes, and the claim
-counts with the verdict of its first definition.
+after its values are known, its other definitions stay in `other_definitions.json` with their outcomes. Every verdict
+that a claim ever had stays in its row of the record.
 
-`rests_on` says what a number depends on: the prediction of a solution, or an input, a rule of construction or the
-arithmetic of Table 1. The last three need no solution and do not count as reproduced numbers.
+`rests_on` says what a number depends on: the prediction of a solution, or a rule of construction, the arithmetic of
+Table 1, or another value that the paper prints. The last three do not count as reproduced numbers.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from math import inf, isfinite, isnan
 
@@ -48,17 +56,19 @@ from verification.claims.levels import (
     Level,
 )
 from verification.evidence.checks import Check
+from verification.sensitivity import Dependence
 from verification.uncertainty import Bar
 
 #: The rows that must be judged.
-EXPECTED = tuple(f"C{number:02d}" for number in (*range(1, 54), *range(60, 66)))
+EXPECTED = tuple(f"C{number:02d}" for number in (*range(1, 55), *range(60, 66)) if number != 62)
 
 REPRODUCED = "reproduced"
 CHANGED = "reproduced with a stated change"
 CONTRADICTED = "contradicted"
 WITHIN_ROUNDING, UNDECIDED = "reproduced within the rounding of Table 1", "undecided"
+DEGREE, DEPENDS = "a matter of degree", "depends on what the paper does not print"
 NOT_JUDGED = "not judged"
-VERDICTS = (REPRODUCED, WITHIN_ROUNDING, CHANGED, CONTRADICTED, UNDECIDED, NOT_JUDGED)
+VERDICTS = (REPRODUCED, WITHIN_ROUNDING, CHANGED, DEGREE, DEPENDS, CONTRADICTED, UNDECIDED, NOT_JUDGED)
 #: Outcomes of a check.
 HOLDS = "holds"
 FAILS = "fails"
@@ -70,6 +80,7 @@ CLOSED = "closed forms"
 #: The basis of a number.
 PREDICTED = "a solution"
 ARITHMETIC = "arithmetic of Table 1"
+REPEATED = "another printed value"
 CONSTRUCTION = "a rule of construction"
 #: Dates: when the ranges of the words were set; when the ranges of later claims were set, and the printed digits became
 #: the ranges of the numbers.
@@ -115,6 +126,50 @@ def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
     if FAILS not in outcomes:
         return UNDECIDED
     return WITHIN_ROUNDING if rounding else CONTRADICTED
+
+
+def common_verdict(verdicts: Iterable[str], depends: bool) -> str:
+    """The verdict of a claim from those of its meanings; depends: whether the claim holds in a part of a range that the
+    paper does not print."""
+    first, *others = verdicts
+    if depends:
+        return DEPENDS
+    return first if all(other == first for other in others) else DEGREE
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What the words of a claim may be taken for.
+
+    words: the meaning; origin: where it comes from; judges: the beginnings of the quantities that it judges, all by
+    default; bounds: {beginning of a quantity: (least, largest) accepted value}, where they differ from those of the
+    check.
+    """
+
+    words: str
+    origin: str
+    judges: tuple[str, ...] = ("",)
+    bounds: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def bounds_of(self, quantity: str, own: tuple[float, float]) -> tuple[float, float] | None:
+        """The accepted interval of a quantity, or None if this meaning does not judge it."""
+        if not quantity.startswith(self.judges):
+            return None
+        return next((bounds for name, bounds in self.bounds.items() if quantity.startswith(name)), own)
+
+    def verdict(self, numbers: Iterable[tuple], changed: bool, rounding: bool) -> str:
+        """The verdict from (quantity, bar, own bounds) of all checks. Raises ClaimError if it judges none, or if a name
+        of a bound is no quantity's."""
+        rows = [(quantity, bar, self.bounds_of(quantity, own)) for quantity, bar, own in numbers]
+        names = [name for name in self.bounds if not any(quantity.startswith(name) for quantity, *_ in rows)]
+        outcomes = {outcome_of(bar, bounds) for _, bar, bounds in rows if bounds}
+        if names or not outcomes:
+            raise ClaimError(f"{self.words}: no quantity has the name {', '.join(names) or self.judges}")
+        return verdict_of(outcomes, changed, rounding)
+
+
+#: The meaning of a claim without words of degree: its own bounds.
+AS_STATED = Meaning("as stated", "the bounds of its numbers")
 
 
 @dataclass(frozen=True)
@@ -180,7 +235,8 @@ class Finding:
     change: the change against the paper, empty if there is none; reason: why a check fails or cannot be decided, used
     only then; rounding: the set of inputs within the rounding of Table 1 that gives all printed numbers of base at
     once, empty if no set does; note: further computed numbers, or a function that computes them at the judged level
-    alone, if they need runs or time of their own.
+    alone, if they need runs or time of their own; dependence: the range of an input that the paper does not print, or
+    a function that computes it, like the note.
     """
 
     checks: tuple[PaperCheck, ...]
@@ -188,20 +244,25 @@ class Finding:
     reason: str = ""
     rounding: str = ""
     note: str | Callable[[], str] = ""
+    dependence: Dependence | Callable[[], Dependence] | None = None
 
-    @property
-    def verdict(self) -> str:
-        """The verdict from the checks and their bars. Raises ClaimError if there is none."""
+    def verdicts(self, meanings: tuple[Meaning, ...] = (AS_STATED,)) -> tuple[str, ...]:
+        """The verdict by each meaning, from the checks and their bars. Raises ClaimError if there is none."""
         if not self.checks:
             raise ClaimError("the finding has no checks")
-        outcomes = {check.outcome for check in self.checks}
-        if outcomes != {HOLDS} and not self.reason:
+        if {check.outcome for check in self.checks} != {HOLDS} and not self.reason:
             raise ClaimError("a check does not hold and no reason is given: " + self._failed())
-        return verdict_of(outcomes, bool(self.change), bool(self.rounding))
+        numbers = [(check.quantity, (check.bar.low, check.bar.high), (check.low, check.high)) for check in self.checks]
+        return tuple(meaning.verdict(numbers, bool(self.change), bool(self.rounding)) for meaning in meanings)
+
+    def verdict(self, meanings: tuple[Meaning, ...] = (AS_STATED,)) -> str:
+        """The verdict by all meanings."""
+        return common_verdict(self.verdicts(meanings), bool(self.dependence and self.dependence.splits))
 
     def with_note(self) -> Finding:
-        """Return the finding with its note computed."""
-        return replace(self, note=self.note() if callable(self.note) else self.note)
+        """Return the finding with its note and its dependence computed."""
+        return replace(self, note=self.note() if callable(self.note) else self.note,
+                       dependence=self.dependence() if callable(self.dependence) else self.dependence)
 
     def _failed(self) -> str:
         return "; ".join(f"{c.quantity} is {c.value:.4g}, accepted {c.low:.4g} to {c.high:.4g}"
@@ -235,7 +296,17 @@ class Claim:
         """The verdict of a finding. Raises ClaimError if there is none, or if a claim that is not judged has checks."""
         if self.unjudged and finding.checks:
             raise ClaimError("a claim that is not judged has checks")
-        return NOT_JUDGED if self.unjudged else finding.verdict
+        return NOT_JUDGED if self.unjudged else finding.verdict(self.meanings)
+
+    @property
+    def meanings(self) -> tuple[Meaning, ...]:
+        """The meanings of its words."""
+        return MEANINGS.get(self.id, (AS_STATED,))
+
+    @property
+    def defined(self) -> str:
+        """When its numbers and the meanings of its words were written, the later of both."""
+        return max(self.date, WRITTEN) if self.id in MEANINGS else self.date
 
     @property
     def of_wide(self) -> bool:
@@ -272,6 +343,9 @@ class Claim:
 
 
 CLAIMS: dict[str, Claim] = {}
+#: The meanings of the words of claims, by id, and when they were written; `meanings` fills them in.
+MEANINGS: dict[str, tuple[Meaning, ...]] = {}
+WRITTEN = "2026-11-29 16:48"
 
 
 def claim(id: str, where: str, text: str, **fields):

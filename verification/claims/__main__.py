@@ -1,7 +1,8 @@
-"""`python -m verification.claims [--record] [C07 C09 ...]`: judge the paper's claims, all of them by default.
+"""`python -m verification.claims [--record | --again] [C07 C09 ...]`: judge the paper's claims, all by default.
 
 The program compares the claims with the committed `claims.json`: every number must lie in its recorded interval, and
-every verdict must be the same. `--record` rewrites the file, or the named claims in it. The exit status is 0 if
+every verdict must be the same. `--record` rewrites the file, or the named claims in it. `--again` judges the recorded
+numbers by the present meanings of the words, without a run, and rewrites the file. The exit status is 0 if
 every claim has a verdict and agrees with the record, 1 if not, and 2 for an unknown claim.
 """
 
@@ -23,6 +24,7 @@ def main(arguments: list[str] | None = None) -> int:
     evaluate.register_all()
     parser = argparse.ArgumentParser(prog="python -m verification.claims", description="Judge the paper's claims.")
     parser.add_argument("--record", action="store_true", help="rewrite the committed claims.json")
+    parser.add_argument("--again", action="store_true", help="judge the recorded numbers by the present meanings")
     parser.add_argument("ids", nargs="*", metavar="ID", help="claims to judge, such as C07; all of them by default")
     chosen = parser.parse_args(arguments)
     unknown = sorted(set(chosen.ids) - set(EXPECTED))
@@ -30,6 +32,10 @@ def main(arguments: list[str] | None = None) -> int:
         accepted = f"{EXPECTED[0]} to {EXPECTED[-1]} are accepted"
         print(f"claims: there is no {', '.join(unknown)}; {accepted}", file=sys.stderr)
         return 2
+    if chosen.again:
+        record([report.judged_again(entry, CLAIMS[entry["id"]]) for entry in report.read()
+                if entry["id"] in (chosen.ids or EXPECTED)])
+        return 0
     rows = judge(tuple(chosen.ids) or EXPECTED)
     print("\n".join([report.LEGEND, *map(report.terminal, rows)]))
     is_judged = all(row.verdict != NO_VERDICT for row in rows)
@@ -45,16 +51,21 @@ def agree_with_record(rows: list[Row], rewrite: bool) -> bool:
     """Whether the rows agree with the committed record; prints the differences."""
     entries = [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
     if rewrite:
-        recorded_entries = {entry["id"]: entry for entry in report.read()}
-        now = f"{datetime.now(UTC):%Y-%m-%d %H:%M}"
-        entries = [report.stamped(entry, recorded_entries.get(entry["id"]), now) for entry in entries]
-        write_json(report.COMMITTED, report.replaced(entries))
-        print(f"{report.COMMITTED.name}: written")
+        record(entries)
         return True
     differences = report.differences(entries, report.read())
     unchanged = f"{len(entries)} claims as recorded in {report.COMMITTED.name}, which stays"
     print("\n".join(differences) or unchanged)
     return not differences
+
+
+def record(entries: list[dict]) -> None:
+    """Rewrite some entries of the record, with the time of their first values and all former verdicts."""
+    recorded_entries = {entry["id"]: entry for entry in report.read()}
+    now = f"{datetime.now(UTC):%Y-%m-%d %H:%M}"
+    entries = [report.stamped(entry, recorded_entries.get(entry["id"]), now) for entry in entries]
+    write_json(report.COMMITTED, report.replaced(entries))
+    print(f"{report.COMMITTED.name}: written")
 
 
 def judge(ids: tuple[str, ...]) -> list[Row]:

@@ -20,14 +20,16 @@ from repro.model.uptake_law import Values
 from repro.network.resistance import added_resistance, share_range
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, claim
+from verification.claims.base_run import upstream_means
 from verification.claims.levels import ABOUT_WIDE
-from verification.claims.permeability import clean, layered_share
+from verification.claims.permeability import CLOSING, LENGTHS, at_length, clean, layered_share
 from verification.claims.runs import (
     BASE,
     PLOTTED,
     SUBSTRATES,
     WIDE,
     Body,
+    Run,
     bodies,
     full_biomass,
     halved,
@@ -54,6 +56,10 @@ def less_biomass() -> Finding:
     checks = [at_least(f"K / K_clean = {reduced:g}: biomass of layers on {walls} wall{'s' * (walls - 1)} over the "
                        "aggregate's", "less", filled(scene.flow.viscosity_ratio, reduced, walls) / filled_at(reduced),
                        1.0, "the words") for reduced in REDUCED for walls in (1, 2)]
+    checks += [at_least(f"{name}: K / K_clean = {SAME:g}: biomass of a layer over the aggregate's, in a pore of "
+                        f"{lengths:g} W", "less", filled(scene.flow.viscosity_ratio, SAME, 1) / filled_at(
+                            SAME, run, lengths), 1.0, "the words")
+               for name, run in (("wide", WIDE), ("base", CLOSING)) for lengths in LENGTHS]
     same = filled_at(SAME)
     checks += [at_least(f"the part filled with which the aggregate has K / K_clean = {SAME:g}: that of layers on "
                         f"{walls} wall{'s' * (walls - 1)} over it", "crucial to model permeability reduction",
@@ -62,12 +68,14 @@ def less_biomass() -> Finding:
     return Finding(tuple(checks), reason="less biomass plugs as a layer, or porosity determines the permeability")
 
 
-def filled_at(reduced: float) -> float:
-    """Share of the pore that the aggregate of wide fills when it has reduced the conductivity to a part."""
-    scene, rows = load_packaged(*WIDE), series(*WIDE)
-    share = rows["conductivity_m_per_d"] / (24e-6 * clean(scene))
+def filled_at(reduced: float, run: Run = WIDE, lengths: float | None = None) -> float:
+    """Share of the pore that the aggregate of a run fills when it has reduced the conductivity to a part; lengths: of
+    the pore over its width, by default the run's own."""
+    scene, rows = load_packaged(*run), series(*run)
+    lengths = lengths or scene.pore.length / scene.pore.width
+    share = at_length(rows["conductivity_m_per_d"] / (24e-6 * clean(scene)), scene, lengths)
     area = np.exp(np.interp(-np.log(reduced), -np.log(share), np.log(rows["aggregate_area_um2"])))
-    return float(area) / (scene.pore.width * scene.pore.length)
+    return float(area) / (scene.pore.width**2 * lengths)
 
 
 def filled(ratio: float, reduced: float, walls: int) -> float:
@@ -80,19 +88,18 @@ def filled(ratio: float, reduced: float, walls: int) -> float:
        date="2026-11-24 13:01")
 def depends_on_the_sink() -> Finding:
     """Sherwood numbers of one shape in one flow with three sinks of the model: nearly of first order (small supply),
-    nearly of zero order (large supply), and with a maximum rate of FASTER times that of Table 1."""
+    nearly of zero order (large supply), and with a maximum rate of FASTER times that of Table 1. The drop of the
+    concentration starts at the pore's supply, or in the water at one of BULK from the aggregate."""
     shapes = [in_one_shape(supply=supply) for supply in SINKS] + [in_one_shape(supply=SINKS[0], faster=FASTER)]
-    sinks = np.array([*map(sherwood, shapes)])
-    checks = tuple(at_least(f"{name}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less "
-                            "one (%)", "depends on the sink in the solid", value, 100 * FEW, FEW_WORDS)
-                   for name, value in zip(SUBSTRATES, spread_in_percent(sinks)))
+    numbers = {place: np.array([sherwood(shape, distance) for shape in shapes]) for place, distance in BULK.items()}
+    checks = tuple(at_least(f"{name}, {place}: Sherwood numbers of three sinks, largest over smallest less one (%)",
+                            "depends on the sink in the solid", value, 100 * FEW, FEW_WORDS)
+                   for place, sinks in numbers.items() for name, value in zip(SUBSTRATES, spread_in_percent(sinks)))
     kinds = (*(f"with supplies of {supply:g} K_s" for supply in SINKS), f"with k times {FASTER:g}")
-    rows = "; ".join(f"{a:.3g} and {d:.3g} {kind}" for kind, (a, d) in zip(kinds, sinks))
-    moved = " and ".join(f"{spread:.1f}" for spread in spread_in_percent(sinks))
-    return Finding(checks, reason="between a sink of nearly zero order and one of "
-                   f"{FASTER:g} times the rate the number changes by only {moved} %, acceptor and donor",
-                   note=f"Sherwood numbers of acceptor and donor of a half-disc of {RADIUS:g} um in the flow of 1e-3 "
-                   f"cm: {rows}. Most of the drop is in the water upstream.")
+    rows = "; ".join(f"{a:.3g} and {d:.3g} {kind}" for kind, (a, d) in zip(kinds, numbers["supply"]))
+    return Finding(checks, reason="with the drop from the pore's supply most of it is in the water upstream, which no "
+                   "sink changes", note=f"Sherwood numbers of acceptor and donor, from the supply, of a half-disc of "
+                   f"{RADIUS:g} um in the flow of 1e-3 cm: {rows}.")
 
 
 @claim("C47", "5", "a mass transfer coefficient cannot be set a priori: it depends on geometry and flow",
@@ -130,11 +137,17 @@ def in_one_shape(radius: float = RADIUS, supply: float = 10.0, head: float = 1e-
                    f'kinetics.maximum_utilization_rate="{9.3 * faster!r} 1/day"', *supplies))[0]
 
 
-def sherwood(aggregate: Body) -> np.ndarray:
-    """Sherwood numbers (2,) of both substrates."""
+#: Places of the bulk concentration: distances (um) upstream of the aggregate; None is the pore's supply.
+BULK = {"supply": None, "25 um upstream": 25.0, "10 um upstream": 10.0, "its edge": 0.0}
+
+
+def sherwood(aggregate: Body, distance: float | None = None) -> np.ndarray:
+    """Sherwood numbers (2,) of both substrates; distance: of the bulk upstream of the aggregate (um), see BULK."""
     outline, edges = aggregate.outline, aggregate.outline.interface_edges()
-    supply, diffusivity = (np.array(pair(name, aggregate.scene.substrates)) for name in ("supply", "diffusivity"))
-    drop = supply - [aggregate.concentration(name)[aggregate.grid.loop[edges]].mean() for name in SUBSTRATES]
+    bulk, diffusivity = (np.array(pair(name, aggregate.scene.substrates)) for name in ("supply", "diffusivity"))
+    if distance is not None:
+        bulk = upstream_means(aggregate.pore, aggregate.solved, distance)
+    drop = bulk - [aggregate.concentration(name)[aggregate.grid.loop[edges]].mean() for name in SUBSTRATES]
     uptake = np.array([flux.supplied - flux.out for flux in aggregate.solved.fluxes])
     return uptake / (outline.edge_lengths()[edges].sum() * drop) * outline.thickness / diffusivity
 

@@ -21,7 +21,8 @@ from repro.model.flow import MPA_PER_UM
 from repro.model.mechanics import Mechanics
 from repro.model.solid import Shape
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
-from verification.claims.levels import ABOUT_WIDE, CONVERGED, PAIRED, Level, at_level
+from verification.claims.levels import ABOUT_WIDE, CONVERGED, FORCES, PAIRED, Level, at_level
+from verification.claims.rheology import conductivity_change, outline_shift
 from verification.claims.runs import (
     BASE,
     END,
@@ -38,6 +39,7 @@ from verification.claims.runs import (
     polygon,
     rows_at,
     stress,
+    until,
 )
 from verification.problems import meshes
 
@@ -76,9 +78,17 @@ class Forces:
         return (self.head + self.shear) / self.stiffness
 
 
-@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", **ABOUT_WIDE)
+#: Hours of wide around contact and after it; a plug slides by the last one.
+HOURS = (34, 35, 40, 42)
+#: Wide with rows at HOURS, without and with the fluid's forces.
+UNFORCED = ("wide", *until(*HOURS))
+FORCED = (*UNFORCED, 'growth.fluid_forces="included"')
+
+
+@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", fine=FORCES, beside=())
 def fluid_forces() -> Finding:
-    """Range of rho g phi plus the largest viscous shear on the interface, against growth's shear stress and stiffness.
+    """Range of rho g phi plus the largest viscous shear on the interface, against growth's shear stress and stiffness;
+    and the effect of the forces on conductivity and shape in runs of wide that include them from the seed on.
 
     The forces are those of the flow fields. A uniform pressure does not deform an incompressible body, so the range of
     the pressure counts. Uniform growth causes P but no shear in the plane [E11], so the comparison is with growth's
@@ -86,18 +96,32 @@ def fluid_forces() -> Finding:
     """
     film, end = touching()[0], bodies(WIDE)[-1]
     last, early = forces(end), forces(body(BASE, UPDATE))
-    chosen = {"base, 19.2 h": forces(body(BASE, PLOTTED)), f"wide, {film.pore.time:.2f} h, a film left": forces(film),
-              f"wide, {end.pore.time:g} h, a plug": last}
+    chosen = {"base, 19.2 h": forces(body(BASE, PLOTTED)), "wide, a film left": forces(film), "wide, a plug": last}
     checks = [at_most(f"{name}: {ratio}", "neglected", value, SMALL, "small: a tenth")
               for name, aggregate_forces in chosen.items()
               for ratio, value in (("fluid's over growth's stress", aggregate_forces.against_growth),
                                   ("strain that the fluid would cause", aggregate_forces.strain))]
+    effects = {hour: effect_of_forces(hour) for hour in HOURS}
+    checks += [at_most(f"forces included, wide, {hour} h: {name} (%)", "neglected", abs(effect[name]), 100 * FEW,
+                       FEW_WORDS) for hour, effect in effects.items() for name in list(effect)[:-1]]
     reason = (f"it holds in base, and in wide while a film of fluid is left. Later a head of {last.head:.3g} Pa drives "
               f"the constant mean velocity through the plug; growth's shear stress is {last.growth:.3g} Pa, and the "
-              f"stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa")
+              f"stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa. The conductivity hardly changes")
+    changes = "; ".join(f"{hour} h: {effect['conductivity']:+.2f} %, {effect['slide']:+.1f} um"
+                        for hour, effect in effects.items())
     note = (f"In base at {UPDATE} h, when growth has hardly begun, the first ratio is {early.against_growth:.2g}, but "
-            f"the strain {early.strain:.1g}.")
+            f"the strain {early.strain:.1g}. Wide with the fluid's forces, change of the conductivity and slide "
+            f"downstream: {changes}.")
     return Finding(tuple(checks), reason=reason, note=note)
+
+
+def effect_of_forces(hour: float) -> dict[str, float]:
+    """Changes (%) of wide at an hour by the fluid's forces: conductivity, area and outlines, moved onto each other and
+    where they lie; and the slide of the aggregate downstream (um)."""
+    slide, in_place, moved = outline_shift(FORCED, hour, UNFORCED)
+    areas = [body(run, hour).outline.area for run in (UNFORCED, FORCED)]
+    return {"conductivity": conductivity_change(FORCED, (hour,), UNFORCED), "area": 100 * (areas[1] / areas[0] - 1),
+            "outlines moved onto each other": moved, "outlines where they lie": in_place, "slide": slide}
 
 
 def forces(aggregate: Body) -> Forces:
@@ -239,7 +263,7 @@ def _on_another_size(most_stressed: dict[Run, Body]) -> str:
 
 
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
-       "aggregate would tear", date="2026-11-22 18:19", **ABOUT_WIDE)
+       "aggregate would tear", date="2026-11-29 17:23", **ABOUT_WIDE)
 def stress_changed_by_fluid() -> Finding:
     """Largest principal stress, in the mean over a tenth of the pore's width, with the fluid's forces and without: of
     base at 19.4 h and of wide at 30 h, with a film left, and of wide at 40 h, a plug under constant velocity. The

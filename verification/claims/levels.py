@@ -66,6 +66,11 @@ PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
 #: Sizes for variants of wide. A run with half the least angle of contact depends on its mesh: at 1.79 it stops in a
 #: step after contact, in which a triangle is turned over.
 COMPARED = tuple(1.25 * 2 ** (half / 2) for half in (1, 2, 3))
+#: Sizes for claims that compare many runs, around the preset "fast" and larger. Bonded base ends early on finer ones.
+MANY = tuple(2.25 * 2 ** (third / 3) for third in range(3))
+#: Sizes for runs of wide with the fluid's forces, whose slide and tractions depend on the mesh: larger elements halve
+#: them.
+FORCES = (2**0.5, 2.0, 2 * 2**0.5)
 #: Size of the scheme beside claims that compare runs of their own, which are expensive.
 BESIDE_PAIRS = (2**0.5,)
 #: Sizes and steps of the scheme, the default first.

@@ -92,7 +92,7 @@ LENGTHS = (600.0, 900.0, 1200.0)
 
 
 @claim("C36", "2.2", "the flux is not affected by the condition at the downgradient end (12), if the channel is long "
-       "enough")
+       "enough", date="2026-11-29 17:14")
 def downgradient_end() -> Finding:
     """Uptake of the aggregate of base at 19.2 h with other positions of the outlet and other values there.
 

@@ -3,8 +3,10 @@
 The committed record of the claims, `claims.json`: intervals and verdicts that a run on any machine must agree with.
 
 An entry has the date of its definition, `defined`, and the time of the first value that was recorded for it,
-`first_value`. `other_definitions` are earlier and later definitions of the claim, with their outcomes and the reason
-why they were replaced. A claim counts with the verdict of its first definition.
+`first_value`. `meanings` are the meanings of its words with their verdicts, `flips` the thresholds at which the worded
+bounds flip, and `dependence` says with which values of an input that the paper does not print the claim holds. `former`
+are all verdicts that the claim had before: when a verdict changes, `--record` adds the last one. `other_definitions`
+are earlier definitions of the claim, with their outcomes and the reason why they were replaced.
 
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
 words), and `input_low` to `input_high` is its range as the inputs of Table 1 move within their rounding (from the
@@ -17,28 +19,27 @@ run, a lower bound: `high` is null, an open end, and so is `scheme_2001`.
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
 
 from verification.claims import (
-    CHANGED,
+    AS_STATED,
+    DEPENDS,
     FAILS,
     HOLDS,
     NOT_JUDGED,
     OF_SCHEME,
     PREDICTED,
     REACHES_OVER,
-    REPRODUCED,
     VERDICTS,
     Claim,
     ClaimError,
     Finding,
     PaperCheck,
-    outcome_of,
-    verdict_of,
+    common_verdict,
 )
 from verification.claims.evaluate import unnumbered
 from verification.evidence.writing import load
@@ -66,16 +67,13 @@ class Row:
         return tuple(check for check in self.finding.checks if check.bar) if self.finding else ()
 
     @property
-    def counted(self) -> str:
-        """The verdict that counts, that of the first definition."""
-        return counted(entry(self))["verdict"] if self.finding else self.verdict
-
-    @property
     def reason(self) -> str:
         """Why a check does not hold, or the claim is not judged; empty where all checks hold."""
         if self.verdict == NOT_JUDGED:
             return self.claim.unjudged
-        return "" if self.verdict in (REPRODUCED, CHANGED) or not self.finding else self.finding.reason
+        if self.finding and any(check.outcome != HOLDS for check in self.checks):
+            return self.finding.reason
+        return self.finding.dependence.text if self.verdict == DEPENDS else ""
 
 
 def terminal_independence(checks: tuple[PaperCheck, ...]) -> str:
@@ -121,7 +119,10 @@ def terminal(row: Row) -> str:
     remarks = {"error": row.error, "command": f"python -m verification.claims {row.id}"}
     if row.checks or row.verdict == NOT_JUDGED:
         finding = row.finding
-        remarks = {"about": row.claim.about, "changed": finding.change, "because": row.reason,
+        known = entry(row)
+        remarks = {"about": row.claim.about, "meanings": "; ".join(map(meaning_text, known["meanings"])),
+                   "flips": "; ".join(map(flip_text, known["flips"])), "depends": known["dependence"],
+                   "changed": finding.change, "because": row.reason,
                    "inputs": finding.rounding, "steps are not varied": row.claim.fixed, "note": finding.note, **remarks}
     lines = [*map(check_text, row.checks), *(f"{name}: {text}" for name, text in remarks.items() if text)]
     head = _paragraph(f"{row.id}  {row.verdict.upper()}: {row.claim.text} (paper: {row.claim.where})", "")
@@ -134,23 +135,44 @@ def other_definitions() -> dict[str, list[dict]]:
     return load(OTHERS, {})
 
 
-def definitions(entry: dict) -> list[dict]:
-    """The definitions of a recorded claim with their verdicts and reasons, the first one first; only the present one if
-    the claim is not judged any more."""
-    if entry["verdict"] == NOT_JUDGED:
-        return [entry]
-    return sorted([entry, *entry["other_definitions"]], key=lambda definition: definition["defined"])
+def former_text(entry: dict) -> str:
+    """The verdicts that a recorded claim had before, with the dates of their definitions, the first one first."""
+    return "; ".join(f"{each['verdict']} ({each['defined']})" for each in entry["former"])
 
 
-def counted(entry: dict) -> dict:
-    """The definition of a recorded claim that counts: the first, unless the claim is not judged."""
-    return definitions(entry)[0]
+def meaning_text(meaning: dict) -> str:
+    """A meaning with its origin and its verdict."""
+    return f"{meaning['words']} [{meaning['origin']}]: {meaning['verdict']}"
 
 
-def describe_verdicts(entry: dict) -> str:
-    """The verdict that counts; if the definition has changed, also the verdict of the last definition."""
-    first, *later = definitions(entry)
-    return f"{first['verdict']} (as redefined: {later[-1]['verdict']})" if later else first["verdict"]
+def flips(checks: list[dict]) -> list[dict]:
+    """The thresholds of the worded bounds of recorded checks: the checks with the same words and origin, bound on the
+    same side, hold together with bounds from ``holds`` on, and one of them fails with bounds beyond ``fails``."""
+    found = []
+    groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    for check in checks:
+        if side := _side(check):
+            groups.setdefault((check["paper"], side, check["tolerance"]["origin"]), []).append(ends(check))
+    for (words, side, _), bars in groups.items():
+        lows, highs = zip(*bars)
+        least = {"at most": (max(highs), max(lows)), "at least": (min(lows), min(highs))}[side]
+        found.append({"words": words, "bound": side, "holds": _finite(least[0]), "fails": _finite(least[1])})
+    return found
+
+
+def _side(check: dict) -> str:
+    """The side of a worded bound; empty for a printed number, or for a range."""
+    low, high = ends(check["tolerance"])
+    if check["paper_low"] is not None or isfinite(low) == isfinite(high):
+        return ""
+    return "at least" if isfinite(low) else "at most"
+
+
+def flip_text(flip: dict) -> str:
+    """A threshold in words."""
+    beyond = "under" if flip["bound"] == "at most" else "over"
+    values = {name: "an open bound" if flip[name] is None else f"{flip[name]:.3g}" for name in ("holds", "fails")}
+    return f"\"{flip['words']}\" as {flip['bound']} {values['holds']} holds, and fails {beyond} {values['fails']}"
 
 
 def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
@@ -166,14 +188,14 @@ def distinct(entries: list[dict]) -> dict[tuple[str, str], str]:
 
 def summary(rows: list[Row]) -> str:
     """Count the claims with each verdict, and their numbers with each outcome."""
-    verdicts = Counter(row.counted for row in rows)
+    verdicts = Counter(row.verdict for row in rows)
     checks = [check for row in rows for check in row.checks]
     outcomes = Counter(check.outcome for check in checks)
     values = Counter(distinct([entry(row) for row in rows if row.checks]).values())
     named = [*VERDICTS, *(verdict for verdict in verdicts if verdict not in VERDICTS)]
     tally = "; ".join(f"{verdicts[verdict]} {verdict}" for verdict in named)
     return "\n".join((
-        f"{len(rows)} claims, as first defined: {tally}.",
+        f"{len(rows)} claims: {tally}.",
         f"{len(checks)} numbers with their bars: {outcomes[HOLDS]} hold, {outcomes[FAILS]} fail, the bar of "
         f"{outcomes[REACHES_OVER]} reaches over a bound.",
         f"{values.total()} distinct printed values that a solution predicts: {values[HOLDS]} within their printed "
@@ -202,30 +224,61 @@ def replaced(entries: list[dict]) -> list[dict]:
 def entry(row: Row) -> dict:
     """A judged claim as plain values."""
     claim, finding = row.claim, row.finding
+    checks = [_check(check, claim.about) for check in row.checks]
+    given = finding.verdicts(claim.meanings) if checks else ()
     return {"id": row.id, "claim": claim.text, "verdict": row.verdict, "where": claim.where, "about": claim.about,
             "change": finding.change, "reason": row.reason, "rounding": finding.rounding, "note": finding.note,
-            "fixed": claim.fixed, "defined": claim.date, "first_value": "",
-            "other_definitions": other_definitions().get(row.id, []),
-            "checks": [_check(check, claim.about) for check in row.checks]}
+            "dependence": finding.dependence.text if finding.dependence else "", "fixed": claim.fixed,
+            "depends": bool(finding.dependence and finding.dependence.splits),
+            "meanings": _meanings(claim, given), "flips": flips(checks), "defined": claim.defined, "first_value": "",
+            "former": [], "other_definitions": other_definitions().get(row.id, []), "checks": checks}
 
 
 def stamped(entry: dict, recorded: dict | None, now: str) -> dict:
-    """The entry with the time of its first value: the recorded one while the definition is the same, else now (UTC).
-    Raises ClaimError for a definition that is not dated before its first value, or not after those of another one; for
-    a new claim not after RULE_SINCE."""
-    if recorded and _definition(entry) == _definition(recorded):
-        return {**entry, "first_value": recorded["first_value"]}
+    """The entry with the time of its first value: the recorded one while the definition is the same, else now (UTC);
+    and with all former verdicts: a recorded verdict that changes, or that has a new definition, is one. Raises
+    ClaimError for a definition that is not dated before its first value, or not after those of another one; for a new
+    claim not after RULE_SINCE."""
+    former = recorded["former"] if recorded else []
+    same = recorded and _definition(entry) == _definition(recorded)
+    if recorded and (not same or entry["verdict"] != recorded["verdict"]):
+        former = [*former, {"verdict": recorded["verdict"], "defined": recorded["defined"]}]
+    if same:
+        return {**entry, "first_value": recorded["first_value"], "former": former}
     before = recorded["first_value"] if recorded else RULE_SINCE
     if not before < entry["defined"] < now:
         raise ClaimError(f"{entry['id']}: the definition is new, and {entry['defined']} is not between {before} and "
                          f"{now}: a definition is dated before its first value, and after those of another definition")
-    return {**entry, "first_value": now}
+    return {**entry, "first_value": now, "former": former}
 
 
 def _definition(entry: dict) -> tuple:
-    """The date of a definition, its quantities, and their printed values with the origins of the tolerances."""
+    """The date of a definition, its quantities, their printed values with the origins of the tolerances, and the
+    meanings of its words."""
     tolerances = [(check["paper"], unnumbered(check["tolerance"]["origin"])) for check in entry["checks"]]
-    return entry["defined"], _quantities(entry), tolerances
+    meanings = [(meaning["words"], meaning["bounds"]) for meaning in entry.get("meanings", [])
+                if meaning["words"] != AS_STATED.words]
+    return entry["defined"], _quantities(entry), tolerances, meanings
+
+
+def judged_again(recorded: dict, claim: Claim) -> dict:
+    """A recorded claim with the verdict of the present meanings of its words, from its recorded numbers alone."""
+    checks = recorded["checks"]
+    numbers = [(check["quantity"], ends(check), ends(check["tolerance"])) for check in checks]
+    words = bool(recorded["change"]), bool(recorded["rounding"])
+    given = [meaning.verdict(numbers, *words) for meaning in claim.meanings] if checks else []
+    depends = recorded.get("depends", False)
+    sure = bool(checks) and all(check["outcome"] == HOLDS for check in checks)
+    reason = (recorded["dependence"] if depends else "") if sure else recorded["reason"]
+    return {**recorded, "reason": reason, "dependence": recorded.get("dependence", ""), "depends": depends,
+            "defined": claim.defined, "meanings": _meanings(claim, given), "flips": flips(checks),
+            "verdict": common_verdict(given, depends) if given else NOT_JUDGED}
+
+
+def _meanings(claim: Claim, given: Iterable[str]) -> list[dict]:
+    return [{"words": meaning.words, "origin": meaning.origin, "judges": list(meaning.judges),
+             "bounds": {name: [*map(_finite, bounds)] for name, bounds in meaning.bounds.items()},
+             "verdict": verdict} for meaning, verdict in zip(claim.meanings, given)]
 
 
 def _check(check: PaperCheck, about: str) -> dict:
@@ -282,41 +335,6 @@ def inside(value: float | None, low: float | None, high: float | None) -> bool:
     return (low is None or low - near <= value) and (high is None or value <= high + near)
 
 
-@dataclass(frozen=True)
-class Flip:
-    """A recorded verdict that changes if a bound moves by the bar of its number.
-
-    id: the claim; quantity: of the check; verdict: with the moved bound.
-    """
-
-    id: str
-    quantity: str
-    verdict: str
-
-
-def flips(entry: dict) -> list[Flip]:
-    """Verdicts of a recorded claim that change if one bound moves by half the width of the bar, to either side; each
-    check and verdict once."""
-    moved = [Flip(entry["id"], check["quantity"], _verdict_with(entry, number, bounds))
-             for number, check in enumerate(entry["checks"]) for bounds in _moved(check)]
-    return [flip for flip in dict.fromkeys(moved) if flip.verdict != entry["verdict"]]
-
-
-def _moved(check: dict) -> list[tuple[float, float]]:
-    """The bounds of a check, one of them moved by the bar; empty if the bar has an open end."""
-    low, high = ends(check["tolerance"])
-    first, last = ends(check)
-    half = 0.5 * (last - first)
-    return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)] if isfinite(half) else []
-
-
 def ends(recorded: dict) -> tuple[float, float]:
     """The ends of a recorded interval, in which an open end is null."""
     return -inf if recorded["low"] is None else recorded["low"], inf if recorded["high"] is None else recorded["high"]
-
-
-def _verdict_with(entry: dict, number: int, bounds: tuple[float, float]) -> str:
-    """The verdict with other bounds of one check."""
-    outcomes = [check["outcome"] for check in entry["checks"]]
-    outcomes[number] = outcome_of(ends(entry["checks"][number]), bounds)
-    return verdict_of(set(outcomes), bool(entry["change"]), bool(entry["rounding"]))

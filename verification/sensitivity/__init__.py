@@ -12,6 +12,7 @@ numbers are stored under the same scene and source.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -19,6 +20,29 @@ from pathlib import Path
 from verification.evidence.writing import load
 
 RECORD = Path(__file__).parent / "sensitivity.json"
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Whether a claim holds with several values of an input that the paper does not print.
+
+    on: the input, with its unit; holds: {value: does it hold?}.
+    """
+
+    on: str
+    holds: dict[str, bool]
+
+    @property
+    def splits(self) -> bool:
+        """Whether it holds with some values and not with others."""
+        return len(set(self.holds.values())) > 1
+
+    @property
+    def text(self) -> str:
+        """The values with which it holds, and the others."""
+        sides = (", ".join(value for value, held in self.holds.items() if held == side) or "none"
+                 for side in (True, False))
+        return "{}: holds with {}; does not with {}".format(self.on, *sides)
 
 
 @cache
@@ -49,13 +73,17 @@ def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> 
     return min(values), max(values)
 
 
-def holds_for_supplies(id: str) -> str:
-    """Describe the supplies of Figure 6 with which a claim holds, and those with which it does not."""
-    by_supply = record()["supplies"]
-    holds = {supply: all(result["claims"][id].values()) for supply, result in by_supply.items()}
-    sides = (" and ".join(supply for supply in holds if holds[supply] == side) or "none" for side in (True, False))
-    return ("the paper prints no supply for Figure 6, and 10 K_s of both is assumed; with {} K_s the claim holds, with "
-            "{} K_s it does not").format(*sides)
+def on_supplies(id: str) -> Dependence:
+    """Whether a claim holds with other supplies of Figure 6, for which the paper prints none."""
+    return Dependence("the supply of Figure 6 (K_s)", {
+        supply: all(result["claims"][id].values()) for supply, result in record()["supplies"].items()})
+
+
+def jointly() -> list[str]:
+    """The supplies of Figure 6 with which all claims hold that depend on it."""
+    supplies = record()["supplies"]
+    split = [id for id in next(iter(supplies.values()))["claims"] if on_supplies(id).splits]
+    return [supply for supply in supplies if all(on_supplies(id).holds[supply] for id in split)]
 
 
 def verified_set() -> str:
@@ -68,8 +96,22 @@ def nearest_set() -> str:
     one_set = record().get("one_set", {"reached": True})
     if one_set["reached"]:
         return ""
-    return (f"no set of inputs within the rounding of Table 1 reaches all printed numbers of base, which would take "
-            f"{one_set['share_of_the_rounding']:.1f} times the rounding; the nearest set: {_described_set()}")
+    share = one_set["share_of_the_rounding"]
+    return (f"no set of inputs within the rounding of Table 1 reaches all printed numbers of base: {impossible()}. By "
+            f"the elasticities it would take {share:.1f} times the rounding; the nearest set within it: "
+            f"{_described_set()}")
+
+
+#: The printed effluents (K_s) and F, and half a unit of their last digits; the supply (K_s).
+EFFLUENTS, RATIO, HALF_DIGIT, SUPPLY = (4.19, 6.13), 1.52, 0.005, 10.0
+
+
+def impossible() -> str:
+    """Why no inputs give the printed effluents, in closed form: F and decay against the ratio of what is consumed."""
+    _, most = in_closed_form(lambda acceptor, donor: (SUPPLY - acceptor) / (SUPPLY - donor),
+                             *((value, HALF_DIGIT) for value in EFFLUENTS))
+    return (f"at least F, and so {RATIO - HALF_DIGIT:.3f}, times as much acceptor as donor is consumed, and at most "
+            f"{most:.3f} times by the printed effluents")
 
 
 def _described_set() -> str:

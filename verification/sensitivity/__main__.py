@@ -133,10 +133,11 @@ def _cell(entry: dict | None) -> str:
 
 def _set(one_set: dict) -> Iterator[str]:
     sentence = (f"{'A' if one_set['reached'] else 'No'} set of inputs within the rounding gives all printed numbers of "
-                f"base at once. {'This' if one_set['reached'] else 'The nearest'}")
+                f"base at once. A closed form proves it: {sensitivity.impossible()}.")
     sizes = _listed(one_set["sizes"], ".3g")
     yield "## One set of inputs"
-    yield (f"{sentence} set takes {one_set['share_of_the_rounding']:.2f} times the rounding. It was run on sizes "
+    yield (f"{sentence} By the elasticities, which are extrapolated beyond the rounding, a set would take "
+           f"{one_set['share_of_the_rounding']:.2f} times the rounding. The nearest set within it was run on sizes "
            f"{sizes} of elements and steps, over those of `accurate`. The bar follows from all of them, and a set "
            "counts if the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
