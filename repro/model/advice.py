@@ -12,8 +12,7 @@ ADVICE: dict[type[StageError], str] = {
 }
 
 
-#: On a bonded lower wall: base ends at 14.0 h in `accurate`, at 17.1 h with refinement 0.7, and at
-#: 12.4 h with 1.0.
+#: On a bonded wall, where strain at contact lines is singular.
 BONDED: dict[type[StageError], str] = {
     OriginFolded: "; no setting helps reliably: the strain at the contact lines of a bonded wall "
                   'is singular, and a finer mesh may stop the run sooner; growth.wall = "sliding" '
