@@ -1,14 +1,14 @@
 """Tables of all reported quantities, from their definitions: python docs/quantities.py > docs/quantities.md"""
 from repro.report.quantities import DERIVED
 from repro.results.arrays import ARRAYS
-from repro.results.columns import BODY, LEDGER, SERIES
+from repro.results.columns import BODY, DETACHED, LEDGER, SERIES
 from repro.runs.history import COUNTS
 from repro.sweeps.table import NUMBERS
 
 TABLES = {
     "Columns of `timeseries.csv` and `table.csv`": SERIES,
     "Columns of each aggregate in these tables if there are several": BODY,
-    "Columns of `ledger.csv`, a row a step": LEDGER,
+    "Columns of `ledger.csv`, a row a step": (*LEDGER, DETACHED),
     "Arrays of the `.vtu` files": ARRAYS,
     "Further quantities on pages": DERIVED,
     "Counts and times in `run.json`": COUNTS,

@@ -268,7 +268,7 @@ def drawn(seed, preset):
 def warnings(changes):
     scene = load_scene("base", changes, unset=["flow.head"])
     width = scene.pore.width
-    plug = numbers.Sizes(scene.growth.end, 3 * width**2, width, 1.5 * width, True)
+    plug = numbers.Sizes(scene.growth.end, 3 * width**2, width, 1.5 * width, True, 3 * width)
     return simplifications.find_warnings(scene, meshing.fastest(scene.flow, scene.pore), plug)
 
 

@@ -27,6 +27,8 @@ def leaves(node, path=()):
         value = getattr(node, field.name)
         if is_dataclass(value):
             yield from leaves(value, (*path, field.name))
+        elif isinstance(value, tuple) and value and is_dataclass(value[0]):
+            yield from (leaf for k, each in enumerate(value) for leaf in leaves(each, (*path, field.name, k)))
         elif (*path, field.name) != ("name",):
             yield (*path, field.name)
 
@@ -48,9 +50,13 @@ def other(value):
 def changed(node, path):
     """Return a scene with another value at a path, or None if its kind has no other value."""
     first, *rest = path
-    value = getattr(node, first)
+    value = node[first] if isinstance(first, int) else getattr(node, first)
     another = changed(value, rest) if rest else other(value)
-    return None if another is None else replace(node, **{first: another})
+    if another is None:
+        return None
+    if isinstance(first, int):
+        return (*node[:first], another, *node[first + 1:])
+    return replace(node, **{first: another})
 
 
 def test_every_value_of_a_scene_counts_in_its_hash():

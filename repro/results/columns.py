@@ -358,7 +358,7 @@ LEDGER = (
 )
 
 #: The column of a ledger whose scene continues after detachment.
-DETACHED = Quantity("detached_pg_per_m", "biomass that leaves the pore at the step's end",
+DETACHED = Quantity("detached_pg_per_m", "detached biomass, which leaves at the step's end",
                     "integral of X_A + X_I over the aggregates that detach; the biomass at the "
                     "step's end is without it",
                     lambda scene, step: step.detached, "detached")

@@ -35,7 +35,7 @@ COMPARED = ("conductivity_m_per_d", "effluent_acceptor_mg_per_L", "effluent_dono
 
 @pytest.mark.case(
     "coupling-gold-pair", kind="cross-code", references=("gold_pair",), runs_with="fast accurate exact",
-    mutants=("film-between-aggregates-coarse", "uptake-of-the-other-aggregate"),
+    mutants=("uptake-of-the-other-aggregate",),
     omitted="paper, order 1: see flow-additivity")
 @parametrize("preset, name", combined({preset: preset for preset in AIMS}, {name: name for name in gold_pair.pairs()}))
 def test_gold_pair(preset, name, record):
@@ -85,7 +85,7 @@ def _toml(seeds: list[dict[str, str]]) -> str:
 @pytest.mark.case(
     "coupling-facing", kind="property", runs_with="fast accurate",
     omitted="exact, paper: as long as all others together",
-    mutants=("plane-is-a-wall", "meeting-when-they-touch"))
+    mutants=("plane-is-a-wall",))
 @parametrize("preset, bound", {preset: (preset, MIRROR_ACCEPTED.get(preset, bound))
                                for preset, bound in MIRROR_AIMS.items()})
 def test_facing(preset, bound, record):

@@ -166,6 +166,8 @@ def scaled(section, length: float, time: float):
         along, during = UNITS.get(getattr(kind, "unit", ""), (0, 0))
         if is_dataclass(value):
             changes[key.name] = scaled(value, length, time)
+        elif isinstance(value, tuple) and value and is_dataclass(value[0]):
+            changes[key.name] = tuple(scaled(each, length, time) for each in value)
         elif key.name == "times" and value:
             changes[key.name] = tuple(time * t for t in value)
         elif (along or during) and value is not None:
