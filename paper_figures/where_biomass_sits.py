@@ -118,7 +118,10 @@ def compared(folders: tuple[Path, ...]) -> dict[str, dict[str, float]]:
     """Loss of conductivity at the compared amount, by drive and arrangement."""
     losses: dict[str, dict[str, float]] = {drive: {} for drive in DRIVES}
     for (name, drive), folder in zip(_keys(), folders):
-        losses[drive][name] = float(np.interp(COMPARED, *_course(folder)))
+        area, lost = _course(folder)
+        if area[-1] < COMPARED:
+            raise ValueError(f"{name}, {drive}: the run ends at an area of {area[-1]:.3g} W²")
+        losses[drive][name] = float(np.interp(COMPARED, area, lost))
     return losses
 
 

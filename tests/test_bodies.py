@@ -279,6 +279,19 @@ def test_an_aggregate_that_detaches_leaves_the_pore_with_its_mass(preset, transp
     assert balance.oxygen_demand(scene.kinetics, ledgers[-1]) == balance.biomass(ledgers[-1]) == 0.0
 
 
+@pytest.mark.parametrize("scheme", ["paper", "fast"])
+def test_an_aggregate_that_a_jump_of_the_flow_takes_away_leaves_at_the_jump(scheme):
+    """The head rises hundredfold at 1 h. The run goes on as a clean pore, and the ledger of the step has the mass."""
+    scene = load_scene("base", [f"numerics.preset={scheme}", "numerics.refinement=0.2", 'growth.end="2 h"',
+                                "growth.fluid_forces=included", 'growth.bonding_strength="1 Pa"', "output.every=1 h",
+                                "growth.after_detachment=continue", 'growth.shear_modulus="1 kPa"',
+                                'flow.head=[["0 h", "1e-3 cm"], ["1 h", "0.1 cm"]]'])
+    reports = [report for _, report in started(scene, (8.0, 0.0, BOTTOM)) if report]
+    assert [(report.pore.time, len(report.pore.bodies)) for report in reports][-2:] == [(1.0, 0), (2.0, 0)]
+    (left,) = [ledger for report in reports for ledger in report.ledgers if ledger.detached]
+    assert left.end == 1.0 and left.biomass_after == pytest.approx(0.0, abs=1e-6 * left.detached)
+
+
 def test_an_aggregate_on_both_walls_does_not_leave():
     """A wall that gives way would set its surface free, and the model has no law for that: the run ends."""
     scene = load_scene("base", ["numerics.preset=fast", "pore.width=20 um", 'growth.end="12 h"', "growth.wall=bonded",

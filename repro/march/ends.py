@@ -220,7 +220,8 @@ def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: s
 
 def name_of(pore: Pore, number: int) -> str:
     """An aggregate in messages, by its place in the list."""
-    return f"aggregate {pore.bodies[number].name}" if len(pore.bodies) > 1 else "the aggregate"
+    name = pore.bodies[number].name
+    return "the aggregate" if len(pore.bodies) == 1 and name == "1" else f"aggregate {name}"
 
 
 def elements_to_end(channel: Channel, pore: Pore, side: str) -> float:

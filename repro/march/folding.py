@@ -30,7 +30,7 @@ class Fold(RunEnd):
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the coordinates (um) of the fold, and the elastic
-    stretch of the surface there. :class:`repro.PoreEnd` is the other early end of a run.
+    stretch of the surface there. :mod:`repro.march.ends` has the other early ends of a run.
 
     Examples
     --------

@@ -97,8 +97,8 @@ def steps(scene: Scene, stepping: Stepping,
     """Yield the state after every step from t = 0 or ``state`` on, with a Report if one is due.
 
     The scene has growth. Raises SimulationError if a stage fails. After the last Report, raises
-    PoreEnd if the aggregate reaches an end of the pore, Fold if its surface folds, and Detachment
-    if it leaves a wall or tears.
+    PoreEnd if an aggregate reaches an end of the pore, Fold if its surface folds, Meeting if two
+    aggregates meet, and Detachment if one leaves a wall or tears.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
@@ -191,29 +191,27 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
         return Reached(step, after, nearest_end(course.ends, step.pore, after))
 
     step, after, control = stepping.advance(stages, pore, solved, state.step_control)
-    full = reached(step, after)
-    if full.event.margin > 0:
-        located = locate(lambda time: reached(*stepping.cut(stages, pore, solved, time)), pore.time,
-                         margin, full)
-        located = replace(located, step=replace(located.step, within=step.within))
-        while located.event.margin > 0 and stages.growth.continues \
-                and located.event.leaves is not None:
-            located = reached(*_after_detachment(stages, located, located.event.leaves))
-        return located, control
-    if stages.tables.jumps(step.pore.time):
-        full = reached(*_after_jump(stages, step, after))
-    return full, control
+    end = reached(step, after)
+    if end.event.margin > 0:
+        end = locate(lambda time: reached(*stepping.cut(stages, pore, solved, time)), pore.time,
+                     margin, end)
+        end = replace(end, step=replace(end.step, within=step.within))
+    elif stages.tables.jumps(step.pore.time):
+        end = reached(*_after_jump(stages, step, after))
+    while end.event.margin > 0 and stages.growth.continues and end.event.leaves is not None:
+        end = reached(*_after_detachment(stages, end, end.event.leaves))
+    return end, control
 
 
 def _after_detachment(stages: Stages, reached: Reached,
                       number: int) -> tuple[StepResult, Solved]:
     """Return the state just after an aggregate, by its place in the list, has left the pore."""
     step = reached.step
-    gone = step.pore.bodies[number].mass
-    left = stages.without(step.pore, number, reached.solved)
-    after, solved = settle(stages, *stages.grading.solve(left))
-    ledger = replace(step.ledger, biomass_after=step.ledger.biomass_after - gone,
-                     detached=step.ledger.detached + gone)
+    mass = step.pore.bodies[number].mass
+    remaining = stages.without(step.pore, number, reached.solved)
+    after, solved = settle(stages, *stages.grading.solve(remaining))
+    ledger = replace(step.ledger, biomass_after=step.ledger.biomass_after - mass,
+                     detached=step.ledger.detached + mass)
     return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 
 

@@ -131,6 +131,8 @@ def _assumed(run: Run) -> str:
             and (part != "numerics" or NEEDED[key] in tables)]
     ends = {"bonding_strength", "tensile_strength"} & tables.get("growth", {}).keys()
     fate = "a run ends where the aggregate detaches or tears" if ends else "no detachment"
+    if tables.get("growth", {}).get("after_detachment") == "continue":
+        fate = "an aggregate that detaches leaves the pore"
     bodies = tables.get("aggregate")
     count = f"{len(bodies)} aggregates" if isinstance(bodies, list) else "one aggregate"
     assumptions.insert(0, f"a pore in the plane, {count}, {fate}")

@@ -11,7 +11,8 @@ from repro.results.columns import BODY, DETACHED, LEDGER, SERIES, of_body
 from repro.results.quantities import SMALLER, Quantity, ending, unit_of
 
 #: Every column and array by its name.
-KNOWN: dict[str, Quantity] = {quantity.name: quantity for quantity in (*LEDGER, DETACHED, *SERIES, *ARRAYS)}
+KNOWN: dict[str, Quantity] = {quantity.name: quantity
+                              for quantity in (*LEDGER, DETACHED, *SERIES, *ARRAYS)}
 #: Pure numbers that stand for yes (1) and no (0).
 YES_NO = {name for name, quantity in KNOWN.items() if quantity.yes_no}
 #: Relative defects of balances.

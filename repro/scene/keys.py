@@ -357,7 +357,7 @@ class Growth:
 
     @property
     def bonded(self) -> bool:
-        """Whether biomass keeps its place on the lower wall."""
+        """Whether biomass keeps its place on the wall of its seed."""
         return self.wall == "bonded"
 
     @property

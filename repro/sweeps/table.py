@@ -223,10 +223,11 @@ def run_columns(factors: Sequence[Factor], runs: Sequence[SweepRun]) -> dict[str
 
 def _rows(sweep: Sweep, runs: list[SweepRun]) -> Iterator[list]:
     """The rows of each run's own table, preceded by its number and the values of its factors."""
+    columns = series_columns(sweep.points)
     for run in runs:
         if len(run.times):
             path = sweep.runs / run.point.name / "timeseries.csv"
             with path.open(encoding="utf-8", newline="") as lines:
                 for row in csv.DictReader(lines):
-                    values = [row.get(name, "") for name in series_columns(sweep.points)]
+                    values = [row.get(name, "") for name in columns]
                     yield [run.point.index, *run.point.values, *values]

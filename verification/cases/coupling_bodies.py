@@ -125,7 +125,7 @@ def test_wake(preset, bound, record):
     """Far downstream of an aggregate the water is mixed again: the second one takes up there what it takes up alone in
     water with the first one's effluents.
 
-    The gap is 30 widths, and the Peclet number u W / D is 2 for the acceptor and 4.6 for the donor: no substrate
+    The gap is 30 widths, and the Peclet number u W / D is 2.2 for the acceptor and 5 for the donor: no substrate
     diffuses upstream over the gap, and it diffuses across the pore within it.
 
     Norm: relative differences of the second one's uptake, and of the effluents.
@@ -154,8 +154,8 @@ def _wake_scene(preset: str, *changes: str):
 
 
 @pytest.mark.case("coupling-meeting", kind="property", runs_with="1 2", mutants=("meeting-when-they-touch",))
-@parametrize("preset, steps", {"fast": ("fast", None), "paper": ("paper", None)})
-def test_meeting(preset, steps, record):
+@parametrize("preset", {"fast": ("fast",), "paper": ("paper",)})
+def test_meeting(preset, record):
     """Two equal aggregates meet where the film between them is the least film, whatever the step.
 
     Norm: relative difference of the film from the least film.
@@ -166,4 +166,4 @@ def test_meeting(preset, steps, record):
     with pytest.raises(Meeting):
         reports.extend(simulate(scene))
     film, _ = reports[-1].pore.outlines[0].film(reports[-1].pore.outlines[1])
-    record(at_most("film", abs(film / 6 - 1), 2e-4, "an end is located if its margin is at most 1e-4"))
+    record(at_most("film", abs(film / 6 - 1), 2e-4, "an end is located if its margin is at most 1e-4; twice that"))

@@ -2,7 +2,7 @@
 
     python -m verification.problems.siblings 17 18     # these pores; all of them without numbers
 
-A quarter of them are bonded and let an aggregate go that detaches. Another quarter has the forces of the water, too.
+A quarter of them are bonded, and another quarter has the forces of the water. Both let an aggregate go that detaches.
 """
 
 import json
