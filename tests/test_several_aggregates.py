@@ -400,7 +400,7 @@ TURNED = ("nodes", "remeshed", "_balance", "_x_um", "_y_um", "fluid_force_y", "m
 TOLERANCE = {"fast": 0.01, "paper": 0.02}
 
 
-@PRESETS
+@pytest.mark.parametrize("preset", ["fast", pytest.param("paper", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("forces", ["neglected", "included"])
 @pytest.mark.parametrize("what", BODIES)
 def test_order_names_and_walls_of_bodies_change_no_column(preset, forces, what):

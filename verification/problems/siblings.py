@@ -17,8 +17,9 @@ from repro.scene import Scene, load_scene
 from verification.problems import family
 
 SEED, SIBLINGS = 46, 60
-#: Processor time (s) of one run.
-LIMIT = 150.0
+#: Processor time (s) of one run. It was 150 s until 35 and 38 were seen to need more: both are bonded, and every trial
+#: of a detachment makes new meshes with small arcs at the edges of the wall.
+LIMIT = 400.0
 #: Radius of a seed, its place and the gap between two seeds, over the width.
 RADII, PLACES, GAP = (0.06, 0.2), (-3.0, 3.0), 0.15
 LETS_GO = ('growth.bonding_strength="6 kPa"', "growth.after_detachment=continue")
