@@ -137,6 +137,13 @@ class Reached:
         """Time (h) of the end of the step."""
         return self.step.pore.time
 
+    def leaves(self, continues: bool) -> int | None:
+        """Place in the list of the aggregate that leaves the pore there, None without one.
+
+        continues: may it leave?
+        """
+        return self.event.leaves if continues and self.event.margin > 0 else None
+
 
 @dataclass(frozen=True, eq=False)
 class Strength:

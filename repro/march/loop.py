@@ -198,8 +198,10 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
         end = replace(end, step=replace(end.step, within=step.within))
     elif stages.tables.jumps(step.pore.time):
         end = reached(*_after_jump(stages, step, after))
-    while end.event.margin > 0 and stages.growth.continues and end.event.leaves is not None:
-        end = reached(*_after_detachment(stages, end, end.event.leaves))
+    leaves = end.leaves(stages.growth.continues)
+    while leaves is not None:
+        end = reached(*_after_detachment(stages, end, leaves))
+        leaves = end.leaves(stages.growth.continues)
     return end, control
 
 
