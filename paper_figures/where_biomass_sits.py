@@ -12,6 +12,7 @@ from matplotlib.patches import Wedge
 
 from paper_figures import states, style
 from paper_figures.runs import FAST, Request
+from verification.problems.hard import clean_conductivity
 
 TITLE = "Addition. Where the biomass sits"
 CLAIMS = ()
@@ -45,7 +46,8 @@ def _request(name: str, drive: str) -> Request:
                             'output.every="1 h"'), label)
 
 
-RUNS = tuple(_request(name, drive) for name in ARRANGEMENTS for drive in DRIVES)
+KEYS = [(name, drive) for name in ARRANGEMENTS for drive in DRIVES]
+RUNS = tuple(_request(*key) for key in KEYS)
 
 
 @style.styled
@@ -78,7 +80,7 @@ def _seeds(axes: Axes) -> None:
 
 def _curves(axes: Axes, folders: tuple[Path, ...]) -> None:
     """Conductivity over that of the clean pore, against the biomass; dashed at constant velocity."""
-    for (name, drive), folder in zip(_keys(), folders):
+    for (name, drive), folder in zip(KEYS, folders):
         area, lost = _course(folder)
         colour = COLOURS[list(ARRANGEMENTS).index(name)]
         if drive == "head":
@@ -103,21 +105,17 @@ def _losses(axes: Axes, folders: tuple[Path, ...]) -> None:
     axes.legend(loc="lower right")
 
 
-def _keys() -> list[tuple[str, str]]:
-    return [(name, drive) for name in ARRANGEMENTS for drive in DRIVES]
-
-
 def _course(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """Total area over W^2, and the loss of conductivity, of all rows."""
     table = states.series(folder)
-    clean = WIDTH**2 / 12 * 9.81e6 / 0.01003e8 * 3600 * 24e-6  # g W^2 / (12 nu), m/day
+    clean = clean_conductivity(RUNS[0].load())
     return table["aggregate_area_um2"] / WIDTH**2, 1 - table["conductivity_m_per_d"] / clean
 
 
 def compared(folders: tuple[Path, ...]) -> dict[str, dict[str, float]]:
     """Loss of conductivity at the compared amount, by drive and arrangement; NaN if a run ends before."""
     losses: dict[str, dict[str, float]] = {drive: {} for drive in DRIVES}
-    for (name, drive), folder in zip(_keys(), folders):
+    for (name, drive), folder in zip(KEYS, folders):
         area, lost = _course(folder)
         losses[drive][name] = float(np.interp(COMPARED, area, lost, right=np.nan))
     return losses
@@ -129,7 +127,7 @@ def caption(*folders: Path) -> str:
     head = losses["head"]
     least, most = min(head, key=head.__getitem__), max(head, key=head.__getitem__)
     apart = max(abs(losses["velocity"][name] - head[name]) for name in head)
-    ends = [name for (name, drive), folder in zip(_keys(), folders)
+    ends = [name for (name, drive), folder in zip(KEYS, folders)
             if drive == "head" and "meet" in states.status(folder)]
     stated = ", ".join(f"{name} {100 * loss:.0f} %" for name, loss in head.items())
     factor = (1 - head[least]) / (1 - head[most])

@@ -39,7 +39,7 @@ def test_stresses_are_those_of_the_equilibrium_on_a_new_mesh():
 
 
 def test_stresses_on_walls_are_computed_only_for_a_scene_with_a_strength(monkeypatch):
-    for name in ("wall_peak", "tensile_peak", "fluid_load"):
+    for name in ("wall_peak", "tensile_peak", "fluid_loads"):
         monkeypatch.setattr(adhesion, name, lambda *_: pytest.fail("a stress was computed"))
     scene, pore = coarse_base(1)
     row = results.row(scene, Report(pore, solve(scene, pore), None, (), 0, {}))

@@ -73,6 +73,16 @@ def test_elements_beside_contact_are_small_at_the_wall_without_the_seed(on):
         assert least > 1.0 if wall == on else least == 0.25
 
 
+@pytest.mark.parametrize("number, middle", [(BOTTOM, 1.0), (TOP, -0.5)])
+def test_a_moment_is_about_the_middle_of_the_contact_with_the_wall_of_the_seed(number, middle):
+    """The contact with the upper wall has another middle than that with the lower one. All forces are 1 along y."""
+    _, block = grown_plug(2)
+    mesh, region = block.mesh, block.region
+    outline = replace(block.boundary, seat=Seat(number))
+    load = adhesion._load(mesh, outline, region, np.tile([0.0, 1.0], (len(region.nodes), 1)))
+    assert load.y == len(region.nodes) and load.moment == pytest.approx((mesh.points[region.nodes, 0] - middle).sum())
+
+
 @pytest.mark.parametrize("number", [1, 2])
 @EVERY_ORDER
 def test_water_slips_only_along_a_wall_that_lets_it(order, number):

@@ -1,4 +1,4 @@
-"""Two aggregates in one pore, by NGSolve: flow and substrates that no code of this project has computed.
+"""Two aggregates in one pore: flow and substrates by NGSolve, without any code of this project.
 
     make gold
 
@@ -56,7 +56,6 @@ def half_disc(radius: float, x: float, lower: bool) -> dict:
         angle = math.pi * k / (2 * ARCS)
         points.append([x + radius * sign * math.cos(angle), level + radius * sign * math.sin(angle)])
         wall.append(0 if k else 1)
-    points[0][1] = level
     return {"points": [*points, [x - radius * sign, level], [x, level]], "wall": [*wall, 1, 1], "width": WIDTH}
 
 

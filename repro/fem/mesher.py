@@ -198,7 +198,7 @@ class _Fluid:
         """Aggregates that touch a wall, counterclockwise around the fluid."""
         touching = [number for number, outline in enumerate(self._outlines)
                     if (outline.wall == wall.number).any()]
-        return sorted(touching, key=lambda number: wall.normal * self._contact(number, wall)[0][0])
+        return sorted(touching, key=lambda number: wall.normal * self._point(number, wall, 0)[0])
 
     def polygons(self) -> list[Polygon]:
         """Nodes of the polygons, along the first wall."""
@@ -231,15 +231,13 @@ class _Fluid:
                        len(order) if after is None else order.index(after)]
         skipped = 0
         if before is not None:
-            start, skipped = self._contact(before, wall)[1], 1
+            start, skipped = self._point(before, wall, 1), 1
         for number in beside:
-            to, back = self._contact(number, wall)
-            yield self._store.add(self._sizes.path(start, to)[skipped:])
-            first, last = _contact(self._outlines[number], wall)
-            yield self._own[number][_backwards(first, last, len(self._own[number]))]
-            start, skipped = back, 1
+            yield self._store.add(self._sizes.path(start, self._point(number, wall, 0))[skipped:])
+            yield self._surface(number, wall, wall)
+            start, skipped = self._point(number, wall, 1), 1
         if after is not None:
-            end = self._contact(after, wall)[0]
+            end = self._point(after, wall, 0)
         yield self._store.add(self._sizes.path(start, end)[skipped:])
 
     def _side(self, number: int | None, wall: Wall, other: Wall, start: np.ndarray,
@@ -248,16 +246,21 @@ class _Fluid:
         last one."""
         if number is None:
             return self._store.add(self._sizes.path(start, end))
+        return self._surface(number, wall, other)
+
+    def _surface(self, number: int, wall: Wall, other: Wall) -> np.ndarray:
+        """Nodes of an aggregate from its first one on a wall to its last one on another wall, or on
+        the same."""
         outline = self._outlines[number]
         first, _ = _contact(outline, wall)
         _, last = _contact(outline, other)
         return self._own[number][_backwards(first, last, len(outline.points))]
 
-    def _contact(self, number: int, wall: Wall) -> tuple[np.ndarray, np.ndarray]:
-        """(2,) um, an aggregate's first and last point on a wall, along the fluid."""
-        first, last = _contact(self._outlines[number], wall)
-        points = self._outlines[number].points
-        return points[first], points[last]
+    def _point(self, number: int, wall: Wall, last: int) -> np.ndarray:
+        """(2,) um, the first point (0) of an aggregate on a wall along the fluid, or the last (1).
+        """
+        outline = self._outlines[number]
+        return outline.points[_contact(outline, wall)[last]]
 
 
 def _contact(outline: Outline, wall: Wall) -> tuple[int, int]:

@@ -11,11 +11,12 @@ Each end is an event: a margin that is zero at the event and positive after it.
 The largest margin is judged at t = 0, at the end of each step, and on both sides of a jump of the
 scene's tables, where the aggregate takes its new equilibrium at once. If it is positive, shorter
 steps from the same start locate its zero (:func:`locate`): the first of all ends. The run ends with
-that state, because the model has no law for what follows. With growth.after_detachment =
-"continue" an aggregate that detaches from its only wall leaves the pore, and the run goes on.
-If it touches both walls and one of them gives way, the run ends: the model has no law for a surface
-that is set free. A margin that becomes positive and
+that state, because the model has no law for what follows. A margin that becomes positive and
 negative again within one step is not noticed.
+
+With growth.after_detachment = "continue" an aggregate that detaches from its only wall leaves the
+pore, and the run goes on. If it touches both walls and one of them gives way, the run ends: the
+model has no law for a surface that is set free.
 
 Two ends have no margin, and are not located. A step without a smooth equilibrium ends a run as a
 fold if the surface can crease (:mod:`repro.march.folding`). Biomass that is born without stress has
@@ -28,6 +29,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf
+
+import numpy as np
 
 from repro.errors import RunEnd, StageError
 from repro.fem.sizing import ACROSS_PORE
@@ -205,12 +208,17 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
 
 def _meetings(least: float, pore: Pore) -> Iterator[Event]:
     """The events of all pairs of aggregates; least: um, film that closes."""
-    for (one, outline), (other, beside) in combinations(zip(pore.bodies, pore.outlines), 2):
-        film, (x, y) = outline.film(beside)
-        end = Meeting(f"aggregates {one.name} and {other.name} meet at t = {pore.time:g} h: near "
-                      f"x = {x:.4g}, y = {y:.4g} um the film between them is {film:.3g} um, and it "
-                      f"closes below growth.minimum_film, {least:g} um; no model follows")
+    for pair, film, (x, y) in _films(pore):
+        end = Meeting(f"{pair} meet at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the "
+                      f"film between them is {film:.3g} um, and it closes below "
+                      f"growth.minimum_film, {least:g} um; no model follows")
         yield Event(1 - film / least, end)
+
+
+def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:
+    """Names of each pair of aggregates, the film (um) between them and its place (2,) um."""
+    for (one, outline), (other, beside) in combinations(zip(pore.bodies, pore.outlines), 2):
+        yield f"aggregates {one.name} and {other.name}", *outline.film(beside)
 
 
 def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: str, subject: str,
@@ -244,10 +252,9 @@ def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
 
     The step from ``previous`` is then too long: the event lies within it.
     """
-    for (one, outline), (other, beside) in combinations(zip(expanded.bodies, expanded.outlines), 2):
-        if outline.film(beside)[0] == 0:
-            raise Meeting(f"aggregates {one.name} and {other.name} meet in the step from "
-                          f"t = {previous.time:g} h")
+    for pair, film, _ in _films(expanded):
+        if film == 0:
+            raise Meeting(f"{pair} meet in the step from t = {previous.time:g} h")
     for side in ("upstream", "downstream"):
         if elements_to_end(channel, expanded, side) < LEAST_ELEMENTS:
             raise PoreEnd(f"the aggregate reaches the pore's {side} end in the step from "

@@ -16,7 +16,7 @@ from repro.errors import GrowthError, MeshError, RunEnd
 from repro.march.state import Compression
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.pore import Pore
-from repro.model.surface import surfaces
+from repro.model.surface import least_stretched
 
 #: The surface folds if no equilibrium exists and its stretch has been below this, 5 % above CREASE:
 #: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.677 (docs/design.md).
@@ -51,7 +51,7 @@ def most_compressed(earlier: Compression, pore: Pore) -> Compression:
     """
     if not any(body.solid.energy.crease for body in pore.bodies):
         return earlier
-    present = min(surfaces(pore), key=lambda surface: surface.least)
+    present = least_stretched(pore)
     if pore.accumulates and present.least >= earlier.stretch:
         return earlier
     return Compression(present.least, *present.place, pore.time)

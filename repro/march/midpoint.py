@@ -58,9 +58,8 @@ class Halfway:
     duration: h, of the entire step; first: rates at its start; expansion: the aggregate half way;
     solved: flow and substrates half way; rates: half way, at the points of the mesh at the start;
     produced: growth of active and of inert biomass of each aggregate over the entire step, um2
-    mg/L; generated:
-    meshes that the step has generated so far; end: the aggregate at the end, None before it is
-    known.
+    mg/L; generated: meshes that the step has generated so far; end: the aggregate at the end, None
+    before it is known.
     """
 
     duration: float

@@ -28,7 +28,7 @@ from functools import lru_cache
 import numpy as np
 
 from repro.fem import elements
-from repro.fem.mesh import Region
+from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, edge_functions
 from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
@@ -136,14 +136,19 @@ def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
     return forces
 
 
-def fluid_load(loading: Loading, pore: Pore, solved: Solved) -> Load:
-    """The force and the moment of the water on the aggregate from which the pore is seen."""
-    nodes = pore.region.nodes
-    forces = pore.mesh.of_region(pore.region, fluid_forces(loading, pore, solved))
-    outline = pore.boundary
-    seeded, *_ = pore.walls
+@lru_cache(maxsize=1)
+def fluid_loads(loading: Loading, pore: Pore, solved: Solved) -> tuple[Load, ...]:
+    """The force and the moment of the water on each aggregate."""
+    forces = fluid_forces(loading, pore, solved)
+    return tuple(_load(pore.mesh, outline, region, pore.mesh.of_region(region, forces))
+                 for outline, region in zip(pore.outlines, pore.mesh.regions))
+
+
+def _load(mesh: Mesh, outline: Outline, region: Region, forces: np.ndarray) -> Load:
+    """Resultant of forces (n, 2) MPa um on the nodes of one aggregate."""
+    seeded, *_ = outline.seat.walls(mesh.walls)
     on = outline.points[outline.wall == seeded.number, 0]
-    x, y = (pore.mesh.points[nodes] - [(on.min() + on.max()) / 2, seeded.y]).T
+    x, y = (mesh.points[region.nodes] - [(on.min() + on.max()) / 2, seeded.y]).T
     moment = float(x @ forces[:, 1] - y @ forces[:, 0])
     return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
 
@@ -187,7 +192,8 @@ def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
     return max(wall_peaks(loading, pore, solved), key=lambda peak: peak.value)
 
 
-def wall_peaks(loading: Loading, pore: Pore, solved: Solved) -> list[Peak]:
+@lru_cache(maxsize=1)
+def wall_peaks(loading: Loading, pore: Pore, solved: Solved) -> tuple[Peak, ...]:
     """Largest mean stress that a wall bears from each aggregate in equilibrium."""
     forces = np.zeros_like(pore.mesh.points)
     forces[pore.mesh.body] = wall_forces(loading, at_rest(loading, pore, solved), solved)
@@ -197,7 +203,7 @@ def wall_peaks(loading: Loading, pore: Pore, solved: Solved) -> list[Peak]:
         own = [_peak_on(pore, outline, region, wall, forces) for wall in pore.mesh.walls
                if not wall.mirrors and (touched == wall.number).any()]
         peaks.append(max(own, key=lambda peak: peak.value))
-    return peaks
+    return tuple(peaks)
 
 
 def _peak_on(pore: Pore, outline: Outline, region: Region, wall: Wall, forces: np.ndarray) -> Peak:
@@ -281,11 +287,12 @@ def tensile_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
     return max(tensile_peaks(loading, pore, solved), key=lambda peak: peak.value)
 
 
-def tensile_peaks(loading: Loading, pore: Pore, solved: Solved) -> list[Peak]:
+@lru_cache(maxsize=1)
+def tensile_peaks(loading: Loading, pore: Pore, solved: Solved) -> tuple[Peak, ...]:
     """:func:`tensile_peak` of each aggregate."""
     rest = at_rest(loading, pore, solved)
-    return [_tensile_peak(loading, rest, body.solid, region)
-            for body, region in zip(rest.bodies, rest.mesh.regions)]
+    return tuple(_tensile_peak(loading, rest, body.solid, region)
+                 for body, region in zip(rest.bodies, rest.mesh.regions))
 
 
 def _tensile_peak(loading: Loading, pore: Pore, solid: Solid, region: Region) -> Peak:

@@ -17,7 +17,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import Wall, Walls, channel_walls, whole_width
+from repro.fem.walls import Seat, Wall, Walls, channel_walls, whole_width
 from repro.model.body import Body
 from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
@@ -240,9 +240,8 @@ class Seeding:
         geometry = numerics.scheme.order
         wall = seat_of(seed, sizes.walls)
         if seed.radius is None:
-            facing = sorted(sizes.walls, key=lambda other: other is not wall)
             points = np.array(seed.outline) + [seed.position, 0.0]
-            return polygon(points, tuple(facing), geometry, seed.smooth,
+            return polygon(points, Seat(wall.number).walls(sizes.walls), geometry, seed.smooth,
                            size_at_tips(numerics, self.meshing.channel.width),
                            bends=interface_of(numerics.interface).bends)
         across = sizing.ACROSS_AGGREGATE * sizes.refinement * front

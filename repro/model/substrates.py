@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,7 @@ def solve(supplied: Substrates, kinetics: Kinetics | None, scheme: Scheme,
     return problem, state, transport.fluxes(problem, sink, state)
 
 
+@lru_cache(maxsize=1)
 def uptakes(problem: Problem, pore: Pore, state: Concentrations) -> np.ndarray:
     """(bodies, 2) um2 mg/L/h, uptake of acceptor and donor by each aggregate."""
     at_points = transport.Balance(problem, Sink(pore.active)).uptake(state.fields.ravel())

@@ -13,8 +13,6 @@ from repro.report.reading import Run
 from repro.results import names
 from repro.scene.units import alike
 
-#: Ends of the columns that are positions. A percentage of a position has no meaning.
-COORDINATES = ("stream_um", "_x_um", "_y_um")
 #: A value of this many times another one is not a percentage any more.
 TIMES = 10.0
 #: Columns without a value between rows, and defects, which are round-off.
@@ -122,7 +120,7 @@ def _row(name: str, run_values: Sequence[float | None]) -> list[str]:
     first, *others = [value if value is None else factor * value for value in run_values]
     texts = [names.with_unit(name, symbol), _text(first)]
     for value in others:
-        texts += [_text(value), _text_difference(first, value, name.endswith(COORDINATES))]
+        texts += [_text(value), _text_difference(first, value, name.endswith(names.COORDINATES))]
     return texts
 
 

@@ -150,7 +150,7 @@ def kinds(drawable: Iterable[str]) -> list[Kind]:
 
 def _of_bodies(drawable: Sequence[str], quantity: Quantity) -> Kind:
     """Make the chart of a quantity of each aggregate; empty for a coordinate."""
-    drawn = () if quantity.signed and quantity.name.endswith("_um") else tuple(
+    drawn = () if quantity.name.endswith(names.COORDINATES) else tuple(
         name for name in drawable if names.label_in(name, quantity))
     return Kind(f"Each aggregate: {quantity.words}", quantity.label, drawn)
 

@@ -122,13 +122,8 @@ def _of_outline(part: str, k: int, scene: Scene, at: Report) -> float:
     return getattr(at.pore.outlines[k], part)
 
 
-def _area(k: int, scene: Scene, at: Report) -> float:
-    return at.pore.outlines[k].area
-
-
 def _load(part: str, k: int, scene: Scene, at: Report) -> float:
-    load = _adhesion().fluid_load(_loading(scene), at.pore.focused(k), at.solved)
-    return getattr(load, part)
+    return getattr(_adhesion().fluid_loads(_loading(scene), at.pore, at.solved)[k], part)
 
 
 def _uptake(substrate: int, k: int, scene: Scene, at: Report) -> float:
@@ -182,7 +177,7 @@ SERIES = (
            "the mean of C over it", lambda k, scene, at: at.solved.fluxes[k].inlet),
     Quantity("aggregate_area_um2", "area of the aggregate",
              "area inside its boundary; of several, the sum",
-             _all(_area, sum), "area", "seed"),
+             _all(partial(_of_outline, "area"), sum), "area", "seed"),
     Quantity("thickness_um", "thickness of the aggregate",
              "largest distance of its boundary from its wall; of several, the largest",
              _all(partial(_of_outline, "thickness"), max), "thickness", "aggregate"),
@@ -260,8 +255,8 @@ SERIES = (
 #: Columns of each aggregate of a scene with several: value takes its place in the pore's list, the
 #: scene and a Report. NAME is its name, or its number from one. They are empty once it has left.
 BODY = (
-    Quantity("aggregate_NAME_area_um2", "area", "area inside its boundary", _area, "area",
-             "aggregate"),
+    Quantity("aggregate_NAME_area_um2", "area", "area inside its boundary",
+             partial(_of_outline, "area"), "area", "aggregate"),
     Quantity("aggregate_NAME_thickness_um", "thickness",
              "largest distance of its boundary from its wall", partial(_of_outline, "thickness"),
              "thickness", "aggregate"),

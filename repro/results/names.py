@@ -13,6 +13,8 @@ from repro.results.quantities import SMALLER, Quantity, ending, unit_of
 #: Every column and array by its name.
 KNOWN: dict[str, Quantity] = {quantity.name: quantity
                               for quantity in (*LEDGER, DETACHED, *SERIES, *ARRAYS)}
+#: Ends of the columns that are coordinates. A percentage of one has no meaning.
+COORDINATES = ("stream_um", "_x_um", "_y_um")
 #: Pure numbers that stand for yes (1) and no (0).
 YES_NO = {name for name, quantity in KNOWN.items() if quantity.yes_no}
 #: Relative defects of balances.

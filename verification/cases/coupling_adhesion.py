@@ -68,7 +68,7 @@ def _load_errors(radius: float, *changes: str) -> tuple[float, float, float]:
                      *changes)
     seed = seeded(scene)
     solved = water(scene, seed)
-    load = adhesion.fluid_load(Loading.of(scene), seed, solved)
+    (load,) = adhesion.fluid_loads(Loading.of(scene), seed, solved)
     drive = scene.flow
     shear = 6 * solved.flow.mean_velocity / WIDTH
     scale = flow.MPA_PER_UM * drive.density * drive.kinematic_viscosity * shear * radius

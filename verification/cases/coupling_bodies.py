@@ -11,6 +11,7 @@ from repro import Meeting, load_scene, simulate, solve
 from repro.results.tables import Results
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_most, each_at_most
+from verification.problems.hard import clean_conductivity
 from verification.problems.runs import with_preset
 
 #: Largest relative errors that presets promise until contact. The first aims, written before the errors were seen, were
@@ -54,7 +55,7 @@ def test_gold_pair(preset, name, record):
     for key, expected in pair.numbers.items():
         if key == "added_um":
             length = scene.pore.length
-            error = _clean_conductivity(scene) * length / row["conductivity_m_per_d"] / (length + expected.value) - 1
+            error = clean_conductivity(scene) * length / row["conductivity_m_per_d"] / (length + expected.value) - 1
             bar = expected.bar / (length + expected.value)
         else:
             error = _column(key, row) / expected.value - 1
@@ -69,11 +70,6 @@ def _column(key: str, row: dict[str, float]) -> float:
         return row[key]
     _, substrate, number, *_ = key.split("_")
     return 1e6 * row[f"aggregate_{number}_{substrate}_uptake_ug_per_m_per_h"]
-
-
-def _clean_conductivity(scene) -> float:
-    """m/day, g W^2 / (12 nu) of the clean pore."""
-    return scene.flow.gravity / scene.flow.kinematic_viscosity * scene.pore.width**2 / 12 * 24e-6
 
 
 def _toml(seeds: list[dict[str, str]]) -> str:

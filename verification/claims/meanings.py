@@ -29,11 +29,11 @@ def under(**bounds: float) -> dict[str, tuple[float, float]]:
     return {name.replace("_", " "): (-inf, bound) for name, bound in bounds.items()}
 
 
-def few(*names: str, share: float = 1.0, judges: tuple[str, ...] = ("",)) -> tuple[Meaning, Meaning, Meaning]:
-    """Meanings of "a few percent" as an upper bound of quantities, in percent times ``share``."""
+def few(*names: str, judges: tuple[str, ...] = ("",)) -> tuple[Meaning, Meaning, Meaning]:
+    """Meanings of "a few percent" as an upper bound of quantities, in percent."""
     return (Meaning("up to 5 %", FIRST, judges),
-            Meaning("up to 3 %", FEW_OF, judges, {name: (-inf, 3 * share) for name in names}),
-            Meaning("up to 10 %", ORDER_OF, judges, {name: (-inf, 10 * share) for name in names}))
+            Meaning("up to 3 %", FEW_OF, judges, {name: (-inf, 3) for name in names}),
+            Meaning("up to 10 %", ORDER_OF, judges, {name: (-inf, 10) for name in names}))
 
 
 def more(*names: str, judges: tuple[str, ...] = ("",)) -> tuple[Meaning, Meaning, Meaning]:

@@ -125,10 +125,10 @@ MUTANTS = (
     *changes(
         "repro/results/columns.py",
         ("family-area-of-corners",
-         "The reported area is that of the polygon through the corners.",
-         "_area",
-         "at.pore.outlines[k].area",
-         "at.pore.outlines[k].corners.area")),
+         "The reported area, thickness and ends are those of the polygon through the corners.",
+         "_of_outline",
+         "at.pore.outlines[k]",
+         "at.pore.outlines[k].corners")),
     *changes(
         "repro/model/transport.py",
         ("family-effluent-not-weighted",
