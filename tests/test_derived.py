@@ -384,7 +384,7 @@ def bearing(scene, changes):
 @pytest.fixture
 def as_it_is(monkeypatch):
     """Stresses are those of a state, not of the equilibrium near it; the states here are not in equilibrium."""
-    monkeypatch.setattr(adhesion, "at_rest", lambda loading, pore, solved: pore)
+    monkeypatch.setattr(adhesion, "at_rest", lambda loading, pore, solved: (pore, solved))
 
 
 @EVERY_STATE

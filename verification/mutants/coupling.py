@@ -8,6 +8,7 @@ ENDS = "tests/test_ends.py::test_"
 BODIES = "tests/test_bodies.py::test_"
 SUPPORT_TESTS = "tests/test_support.py::test_"
 ROUNDS_TESTS = "tests/test_traction.py::test_rounds_"
+PARTS_TESTS = "tests/test_refinement.py::test_"
 SMALLEST_CONTACT = f"{CONTACT_TESTS}the_contact_surface_is_the_smallest_that_leaves_enough_fluid"
 
 MUTANTS = (
@@ -26,6 +27,32 @@ MUTANTS = (
          "replace(wall, bonded=False)",
          "wall",
          "tests/test_walls.py::test_a_scene_bonds_each_aggregate_to_the_wall_of_its_seed_alone[bonded]")),
+    *changes(
+        "repro/fem/refinement.py",
+        ("hanging-nodes",
+         "A triangle beside a cut edge stays whole.",
+         "_bisect",
+         "cut[edge].any(axis=1) & ~cut[edge[:, 0]]",
+         "np.zeros(len(edge), bool)",
+         f"{PARTS_TESTS}no_edge_is_longer_than_the_size_around_it_and_no_node_hangs[2-two]"),
+        ("middles-on-chords",
+         "Nodes of parts lie on straight lines between the corners of their triangle.",
+         "_mapped",
+         "Located(owner, local).field(mesh.points, mesh.cells)",
+         "Located(owner, local).field(mesh.points, mesh.triangles)",
+         f"{PARTS_TESTS}parts_have_the_shape_and_the_fields_of_their_triangles[2-upper]"),
+        ("parts-in-other-triangles",
+         "The points of a part are looked up in the triangle of its number, not in the one in which it lies.",
+         "Refined.points_of",
+         "owner = np.repeat(self.owner[parts], len(local))",
+         "owner = np.repeat(np.sort(self.owner[parts]), len(local))",
+         f"{PARTS_TESTS}parts_have_the_shape_and_the_fields_of_their_triangles[2-one]"),
+        ("last-middle-of-an-edge",
+         "The last part of an edge has its middle half way to the start of the edge.",
+         "_with_middles",
+         "np.where(after > t, after, 1.0)",
+         "after",
+         f"{PARTS_TESTS}parts_have_the_shape_and_the_fields_of_their_triangles[2-one]")),
     *changes(
         "repro/fem/sizing.py",
         ("film-between-aggregates-coarse",
@@ -304,13 +331,24 @@ MUTANTS = (
          "Walls bear the stress of a shape that was carried to a new mesh.",
          "wall_peaks",
          "at_rest(loading, pore, solved)",
-         "pore",
+         "(pore, solved)",
          "tests/test_detachment.py::test_stresses_are_those_of_the_equilibrium_on_a_new_mesh"),
+        ("stresses-on-the-triangles-of-the-run",
+         "Stresses are those on the triangles of the run, which are longer than the means.",
+         "at_rest",
+         "with_finer_lines(pore, LENGTH * pore.mesh.width / ELEMENTS_ALONG)",
+         "with_finer_lines(pore, pore.mesh.width)"),
+        ("theta-beyond-its-triangle",
+         "Beside a contact line theta of a part is extrapolated beyond the values in its triangle, and may be negative.",
+         "with_finer_lines",
+         "np.clip(theta, *(limit(body.theta, axis=1)[points.triangle] for limit in (np.min, np.max)))",
+         "theta",
+         "tests/test_detachment.py::test_theta_of_parts_stays_within_that_of_their_triangles"),
         ("tensile-stress-of-the-carried-shape",
          "The tensile stress is that of a shape that was carried to a new mesh.",
          "tensile_peaks",
          "at_rest(loading, pore, solved)",
-         "pore",
+         "(pore, solved)",
          "tests/test_detachment.py::test_stresses_are_those_of_the_equilibrium_on_a_new_mesh")),
     *changes(
         "repro/model/closing_by_nodes.py",

@@ -1,0 +1,201 @@
+"""Smaller triangles in a mesh, by bisection of longest edges (Rivara 1984).
+
+Each part lies in one triangle of the mesh and is its image under the same map, so a shape and its
+fields stay unchanged to round-off. A new mesh by :mod:`repro.fem.mesher` interpolates them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from repro.fem import elements
+from repro.fem.mesh import Mesh, curved
+from repro.fem.outline import Outline
+from repro.fem.sizing import SPLIT, placed
+from repro.fem.transfer import Located
+
+#: Coordinates nearer to a wall or an end than this times the width lie on it.
+ROUND_OFF = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A mesh of parts of the triangles of another one.
+
+    mesh, outlines: of the parts; owner: (T,) triangle of the other mesh in which each lies; local:
+    (T, 3, 2) places of its corners on the unit triangle of that one.
+    """
+
+    mesh: Mesh
+    outlines: list[Outline]
+    owner: np.ndarray
+    local: np.ndarray
+
+    def nodes_of(self, parts: np.ndarray, owners: np.ndarray) -> Located:
+        """Where the nodes of some parts, ascending, lie in the triangles ``owners`` (ascending
+        numbers) of the other mesh."""
+        cells = self.mesh.cells[parts]
+        _, first = np.unique(cells, return_index=True)
+        local = _within(self.local[parts], elements.nodes(self.mesh.geometry)).reshape(-1, 2)
+        owner = np.repeat(self.owner[parts], cells.shape[1])
+        return Located(np.searchsorted(owners, owner[first]), local[first])
+
+    def points_of(self, parts: np.ndarray, owners: np.ndarray, local: np.ndarray) -> Located:
+        """Where points (q, 2) of the unit triangle of some parts lie in the triangles ``owners``
+        (ascending numbers) of the other mesh, part by part."""
+        owner = np.repeat(self.owner[parts], len(local))
+        return Located(np.searchsorted(owners, owner),
+                       _within(self.local[parts], local).reshape(-1, 2))
+
+
+@dataclass(eq=False)
+class _Parts:
+    """Triangles (T, 3) between corners (N, 2) um, in triangles of a mesh; middles: the corner
+    between two others (smaller number first) whose edge was cut."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+    owner: np.ndarray
+    local: np.ndarray
+    middles: dict[tuple[int, int], int]
+
+
+def refined(mesh: Mesh, outlines: Sequence[Outline],
+            size: Callable[[np.ndarray], np.ndarray]) -> Refined:
+    """Bisect triangles until no edge is longer than ``SPLIT`` times the size around it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    outlines : sequence of Outline
+        Boundaries of its aggregates.
+    size : callable
+        Size (K,) um at points (K, 2) um.
+
+    Returns
+    -------
+    Refined
+    """
+    unit = elements.nodes(1)
+    parts = _Parts(mesh.points[: mesh.corners], mesh.triangles, np.arange(len(mesh.triangles)),
+                   np.tile(unit, (len(mesh.triangles), 1, 1)), {})
+    while _bisect(mesh, parts, size):
+        pass
+    finer = []
+    loops = []
+    for outline, loop in zip(outlines, mesh.straight.topology.loops):
+        corners, arc, t = _along(parts, loop)
+        loops.append(corners)
+        if mesh.geometry == 2:
+            arc, t = np.repeat(arc, 2), _with_middles(t)
+        finer.append(placed(outline, arc, t))
+    return Refined(_meshed(mesh, parts, tuple(loops), finer), finer, parts.owner, parts.local)
+
+
+def _bisect(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Cut the longest edges of triangles that are too large, and those that keep the mesh without
+    hanging nodes; False if there are none."""
+    triangles = parts.triangles
+    corners = parts.points[triangles]
+    lengths = np.linalg.norm(corners[:, elements.NEXT] - corners, axis=2)
+    large = lengths.max(axis=1) > SPLIT * size(corners.mean(axis=1))
+    if not large.any():
+        return False
+    # The longest edge 01 first: both triangles beside an edge compare the same lengths.
+    turn = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    rows = np.arange(len(triangles))[:, None]
+    v = triangles[rows, turn]
+    local = parts.local[rows, turn]
+    ends = np.sort(np.stack([v, v[:, elements.NEXT]], axis=2), axis=2).reshape(-1, 2)
+    edges, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    edge = edge.reshape(-1, 3)
+    cut = np.zeros(len(edges), bool)
+    cut[edge[large, 0]] = True
+    while (more := cut[edge].any(axis=1) & ~cut[edge[:, 0]]).any():
+        cut[edge[more, 0]] = True
+    new = np.full(len(edges), -1)
+    new[cut] = len(parts.points) + np.arange(cut.sum())
+    triangle, side = np.divmod(first[cut], 3)
+    between = 0.5 * (local + local[:, elements.NEXT])
+    added = _mapped(mesh, parts.owner[triangle], between[triangle, side])
+    parts.points = np.vstack([parts.points, added])
+    parts.middles.update(zip(map(tuple, edges[cut].tolist()), new[cut].tolist()))
+
+    middle = new[edge]
+    is_cut = middle >= 0
+    m, k, n = range(3, 6)
+    numbers = np.column_stack([v, middle])
+    places = np.concatenate([local, between], axis=1)
+    pieces = [(~is_cut[:, 0], (0, 1, 2)),
+              (is_cut[:, 0] & ~is_cut[:, 2], (0, m, 2)),
+              (is_cut[:, 0] & is_cut[:, 2], (0, m, n)), (is_cut[:, 0] & is_cut[:, 2], (n, m, 2)),
+              (is_cut[:, 0] & ~is_cut[:, 1], (m, 1, 2)),
+              (is_cut[:, 0] & is_cut[:, 1], (m, 1, k)), (is_cut[:, 0] & is_cut[:, 1], (m, k, 2))]
+    parts.triangles = np.concatenate([numbers[chosen][:, own] for chosen, own in pieces])
+    parts.local = np.concatenate([places[chosen][:, own] for chosen, own in pieces])
+    parts.owner = np.concatenate([parts.owner[chosen] for chosen, _ in pieces])
+    return True
+
+
+def _mapped(mesh: Mesh, owner: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """(K, 2) um of places (K, 2) on the unit triangles of a mesh's triangles (K,)."""
+    return Located(owner, local).field(mesh.points, mesh.cells)
+
+
+def _within(corners: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """(T, q, 2) places of points (q, 2) of the unit triangle between corners (T, 3, 2)."""
+    return np.einsum("qc,tci->tqi", elements.values(1, local), corners)
+
+
+def _along(parts: _Parts, loop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners of a loop (M,) after its edges were cut, the edge of each, and its place on it."""
+    found = []
+
+    def walk(a: int, b: int, edge: int, start: float, end: float) -> None:
+        middle = parts.middles.get((min(a, b), max(a, b)))
+        if middle is None:
+            found.append((a, edge, start))
+        else:
+            half = 0.5 * (start + end)
+            walk(a, middle, edge, start, half)
+            walk(middle, b, edge, half, end)
+
+    for edge, (a, b) in enumerate(zip(loop.tolist(), np.roll(loop, -1).tolist())):
+        walk(a, b, edge, 0.0, 1.0)
+    corners, edges, t = zip(*found)
+    return np.array(corners), np.array(edges), np.array(t)
+
+
+def _with_middles(t: np.ndarray) -> np.ndarray:
+    """(2 K,) places on an edge, each with the middle between it and the next one."""
+    after = np.append(t[1:], 0.0)
+    return np.column_stack([t, 0.5 * (t + np.where(after > t, after, 1.0))]).ravel()
+
+
+def _meshed(mesh: Mesh, parts: _Parts, loops: tuple[np.ndarray, ...],
+            outlines: list[Outline]) -> Mesh:
+    """The mesh of the parts, its loops on the outlines."""
+    straight = Mesh.of(_on_lines(mesh, parts.points), parts.triangles,
+                       mesh.topology.region[parts.owner], loops, mesh.walls, mesh.ends,
+                       mesh.topology.method)
+    fine = straight if mesh.geometry == 1 else curved(straight, None)
+    points = fine.points.copy()
+    local = _within(parts.local, elements.nodes(mesh.geometry))
+    owner = np.repeat(parts.owner, local.shape[1])
+    points[fine.cells.ravel()] = _mapped(mesh, owner, local.reshape(-1, 2))
+    for loop, outline in zip(fine.topology.loops, outlines):
+        points[loop] = outline.points
+    return replace(fine, points=_on_lines(mesh, points))
+
+
+def _on_lines(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    """Points (N, 2) um; those beside a wall or an end, to round-off, are on it."""
+    points = points.copy()
+    near = ROUND_OFF * mesh.width
+    for axis, levels in enumerate((mesh.ends, [wall.y for wall in mesh.walls])):
+        for level in levels:
+            points[np.abs(points[:, axis] - level) < near, axis] = level
+    return points
