@@ -339,7 +339,7 @@ MUTANTS = (
          "with_finer_lines(pore, LENGTH * pore.mesh.width / ELEMENTS_ALONG)",
          "with_finer_lines(pore, pore.mesh.width)"),
         ("theta-beyond-its-triangle",
-         "Beside a contact line theta of a part is extrapolated beyond the values in its triangle, and may be negative.",
+         "Beside a contact line theta of a part is extrapolated beyond the values in its triangle, even below zero.",
          "with_finer_lines",
          "np.clip(theta, *(limit(body.theta, axis=1)[points.triangle] for limit in (np.min, np.max)))",
          "theta",
