@@ -20,7 +20,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate network gold docs clean
+.PHONY: help env figures check-manifest claims sensitivity validation verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate network gold docs clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
@@ -39,6 +39,9 @@ claims: $(STAMP) ## judge the paper's claims by computed numbers, and write the 
 
 sensitivity: $(STAMP) ## effects of the rounding of Table 1: elasticities, one set of inputs; continues an interrupted study
 	@$(BIN) -m verification.sensitivity
+
+validation: $(STAMP) ## compare the model with measurements, and write the tables of docs/validation.md
+	@$(BIN) -m verification.validation
 
 verify: $(STAMP) ## run the verification cases against independent references, and write their pages
 	@$(BIN) -m pytest verification -n logical --dist worksteal --pages $(SLOW)

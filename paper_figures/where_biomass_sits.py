@@ -12,6 +12,7 @@ from matplotlib.patches import Wedge
 
 from paper_figures import states, style
 from paper_figures.runs import FAST, Request
+from verification.problems.arrangements import ARRANGEMENTS, COMPARED, seeds
 from verification.problems.hard import clean_conductivity
 
 TITLE = "Addition. Where the biomass sits"
@@ -19,30 +20,17 @@ CLAIMS = ()
 
 #: Radius (um) of a single seed; n seeds have the same total area. Width and length of Base, um.
 RADIUS, WIDTH, LENGTH = 10.0, 50.0, 600.0
-LOWER, UPPER = "lower", "upper"
-#: Places of the seeds (um), and their walls.
-ARRANGEMENTS = {
-    "one": ((0, LOWER),),
-    "two facing": ((0, LOWER), (0, UPPER)),
-    "two staggered": ((-50, LOWER), (50, UPPER)),
-    "four in facing pairs": ((-75, LOWER), (-75, UPPER), (75, LOWER), (75, UPPER)),
-    "eight alternating": tuple((-175 + 50 * k, (LOWER, UPPER)[k % 2]) for k in range(8))}
 #: Both drives: the section [flow], and the last hour.
 DRIVES = {"head": ('{head="1e-3 cm"}', 60), "velocity": ('{mean_velocity="2.9 m/day"}', 30)}
 COLOURS = (style.BLACK, style.RED, style.BLUE, style.RIM, style.SKY)
-#: Total area over W^2 at which the arrangements are compared.
-COMPARED = 0.6
 #: Losses of permeability at nearly equal amounts of biomass in micromodels (Jiao et al. 2025).
 PUBLISHED = (0.78, 0.94)
 
 
 def _request(name: str, drive: str) -> Request:
-    places = ARRANGEMENTS[name]
-    radius = RADIUS / math.sqrt(len(places))
-    seeds = ", ".join(f'{{radius="{radius:.6g} um", position="{x} um", wall="{wall}"}}' for x, wall in places)
     flow, end = DRIVES[drive]
     label = f"{name.replace(' ', '_')}_{drive}"
-    return Request("base", (FAST, f"aggregate=[{seeds}]", f"flow={flow}", f'growth.end="{end} h"',
+    return Request("base", (FAST, seeds(ARRANGEMENTS[name], RADIUS), f"flow={flow}", f'growth.end="{end} h"',
                             'output.every="1 h"'), label)
 
 
@@ -72,7 +60,7 @@ def _seeds(axes: Axes) -> None:
             axes.axhline(level, color=style.WALL, linewidth=0.8)
         radius = RADIUS / math.sqrt(len(places))
         for x, wall in places:
-            start, centre = (0, low) if wall == LOWER else (180, low + WIDTH)
+            start, centre = (0, low) if wall == "lower" else (180, low + WIDTH)
             axes.add_patch(Wedge((x, centre), radius, start, start + 180, facecolor=colour, zorder=2))
     axes.set(xlim=(-LENGTH / 2, LENGTH / 2), aspect="equal", xlabel=style.X_LABEL, yticks=[],
              title="seeds of the same total area")
