@@ -124,6 +124,19 @@ def test_a_table_sorts_by_keys_and_filters_its_rows(window):
     assert 3 < len(shown) < 50 and all("flow" in row and "exact" in row for row in shown)
 
 
+def test_the_index_of_cases_has_menus(window):
+    """Menus choose stage, kind, elements and equations; those that are chosen hold together with the field."""
+    window.show(SITE / "build" / "cases" / "index.html")
+    for menu, entry in (("stage", "flow"), ("kind", "exact"), ("elements and presets", "2"), ("equations", "(1)-(6)")):
+        window.run(f"menu = document.querySelector('[aria-label=\"Choose {menu}\"]'); menu.value = '{entry}';"
+                   "menu.dispatchEvent(new Event('input'))")
+    shown = window.run(f"[...{ROWS}].filter(row => row.offsetParent)"
+                       ".map(row => [...row.cells].slice(1, 5).map(cell => cell.innerText.trim()))")
+    assert 1 < len(shown) < 20
+    for stage, kind, elements, equations in shown:
+        assert (stage, kind) == ("flow", "exact") and "2" in elements.split("; ") and "(1)-(6)" in equations
+
+
 def test_the_register_of_claims_sorts_and_filters(window):
     """It sorts by verdict, with equal verdicts in the order of the claims, and back by number. A filter hides rows."""
     window.show(REGISTER)
