@@ -26,11 +26,11 @@ include_patterns = [
     "verification/sensitivity/sensitivity.md",
     "build/cases/*.md",  # generated when the build begins
 ]
-#: Of build/, cases alone has sources; the others are environments.
+#: Of build/, cases alone has sources.
 exclude_patterns = ["docs/_build", "build/[!c]*", "build/crate", "**/.*"]
 extensions = [
     "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design",
-    "mathml", "citations", "times", "case_sources",  # in docs/site
+    "mathml", "citations", "times", "case_sources", "scene_keys", "film",  # in docs/site
 ]
 source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}

@@ -7,13 +7,14 @@ import re
 import time
 from functools import cache
 from html import unescape
-from urllib.parse import unquote, urldefrag
+from urllib.parse import quote_plus, unquote, urldefrag
 
 import pytest
 
 from paper_figures import FIGURES
 from tests import browser
 from tests.blocks import ROOT
+from tests.test_published import QUESTIONS
 from verification.claims import EXPECTED
 
 SITE = ROOT / "docs" / "_build" / "html"
@@ -102,6 +103,10 @@ def test_the_root_leads_to_the_start(window):
 def test_the_search_finds_pages(window):
     window.show(SITE / "search.html", "?q=neo-Hookean")
     assert wait_for(window, "document.querySelectorAll('#search-results li a').length >= 2")
+    for question in QUESTIONS:
+        window.show(SITE / "search.html", f"?q={quote_plus(question)}")
+        assert wait_for(window, "[...document.querySelectorAll('#search-results li a')]"
+                                ".some(link => link.href.includes('questions.html'))"), question
     window.show(SITE / "search.html", "?q=zzzznothing")
     assert wait_for(window, "/did not match/.test(document.getElementById('search-results').innerText)")
 
