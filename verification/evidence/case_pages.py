@@ -82,7 +82,7 @@ def article(case: Case, record: Mapping, folder: Path) -> list[str]:
             *_picture("Errors", ERRORS, folder / f"{case.id}.svg"), "## Numbers", *judged,
             "## Mutants", "The case must fail with each of these wrong changes of the code. Each is run until a case "
             "catches it.", table(("mutant", "what is wrong with it", "file", "caught by"), _mutants(case)),
-            "## Run it", f"```\n{command(case)}\n```", "## Code", f"```python\n{source(case)}```",
+            "## Run it", f"```sh\n{command(case)}\n```", "## Code", f"```python\n{source(case)}```",
             f"[All cases](index.md); [cases of this stage]({_report(case.stage)})"]
 
 
