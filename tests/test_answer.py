@@ -47,6 +47,14 @@ def test_the_sentence_has_contact_conductivity_and_effluents(run, expected):
     assert answer.sentence(run) == expected
 
 
+@pytest.mark.parametrize("status, reached", [("completed", True), ("failed: stopped", False), ("folds at 2 h", False)])
+def test_the_sentence_says_that_the_scene_is_run_to_its_end(status, reached):
+    """Any other end is the status of the run, above the sentence."""
+    run = made(**FALLING)
+    run.record["status"] = status
+    assert ("h. The run reaches growth.end. No aggregate" in answer.sentence(run)) == reached
+
+
 def test_a_run_without_rows_says_so():
     assert answer.build(made(conductivity_m_per_d=[])) == "<p>The run has no row: it stopped before the first.</p>"
 

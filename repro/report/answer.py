@@ -36,10 +36,11 @@ def build(run: Run) -> str:
 
 
 def sentence(run: Run) -> str:
-    """The answer in words: last row, contact, conductivity, effluents."""
+    """The answer in words: last row, end, contact, conductivity, effluents."""
     count, last = len(run.times), run.times[-1]
     parts = [f"{count} rows, to t = {last:g} h." if count > 1 else f"One row, at t = {last:g} h."]
-    parts += [_contact(run)] if count > 1 and "growth" in run.record["tables"] else []
+    if count > 1 and "growth" in run.record["tables"]:
+        parts += [_end(run), _contact(run)]
     parts += [_detached(run), _change("conductivity", "conductivity_m_per_d", run, ratio=True)]
     parts += [_change(f"{name} in the effluent", f"effluent_{name}_mg_per_L", run)
               for name in ("acceptor", "donor")]
@@ -55,6 +56,12 @@ def _detached(run: Run) -> str:
         return ""
     times = ", ".join(f"{time:.6g}" for time in run.ledger["end_h"][masses > 0])
     return f"An aggregate leaves the pore at t = {times} h."
+
+
+def _end(run: Run) -> str:
+    """The end that the scene asks for; the status of the run names any other one."""
+    reached = run.record.get("status") == "completed"
+    return "The run reaches growth.end." if reached else ""
 
 
 def _contact(run: Run) -> str:

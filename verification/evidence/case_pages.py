@@ -22,6 +22,8 @@ from verification.mutants import runner
 #: Texts on the drawing and on the picture of the errors.
 GEOMETRY = "The first mesh that the case makes. Brown: biomass; blue: fluid."
 ERRORS = "Recorded errors against sizes of meshes or steps. Dashed: the expected order."
+#: Largest number of variants that a page lists.
+MOST_LABELS = 24
 #: Front matter of a page that no table of contents lists.
 ORPHAN = "---\norphan: true\n---\n\n"
 
@@ -92,8 +94,15 @@ def _facts(case: Case) -> list[tuple[str, str]]:
     rows = {"stage": pages.TITLES[case.stage], "kind": case.kind, "equations": "; ".join(equations()[case.id]),
             "elements and presets": ", ".join(case.numerics), "others": case.omitted,
             "references": ", ".join(f"reference/{name}.py" for name in sorted(references_of(case))),
-            "variants": pages.listed([*filter(None, case.variants)]), "slow": slow if case.slow_variants else ""}
+            "variants": _variants([*filter(None, case.variants)]), "slow": slow if case.slow_variants else ""}
     return [(name, text) for name, text in rows.items() if text]
+
+
+def _variants(labels: list[str]) -> str:
+    """The labels of the variants; of many ones the number, the first three and the last."""
+    if len(labels) <= MOST_LABELS:
+        return pages.listed(labels)
+    return f"{len(labels)}: {'; '.join(labels[:3])}; ...; {labels[-1]}"
 
 
 @cache
