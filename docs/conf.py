@@ -24,11 +24,13 @@ include_patterns = [
     "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**.md", "docs/examples/*.py", "paper_figures/replication.md",
     "paper_figures/register.md", "reference/ERRATA.md", "verification/report/*.md",
     "verification/sensitivity/sensitivity.md",
+    "build/cases/*.md",  # generated when the build begins
 ]
-exclude_patterns = ["docs/_build", "build", "**/.*"]
+#: Of build/, cases alone has sources.
+exclude_patterns = ["docs/_build", "build/[!c]*", "build/crate", "**/.*"]
 extensions = [
     "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design",
-    "mathml", "citations", "times",  # in docs/site
+    "mathml", "citations", "times", "case_sources", "scene_keys", "film",  # in docs/site
 ]
 source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}

@@ -128,6 +128,24 @@ def test_wheel_and_source_distribution_are_complete(tmp_path):
     assert required - packed == set()
 
 
+#: Next questions of a study, as they are typed into the search of the site.
+QUESTIONS = ("two colonies", "acetate", "windows", "converging throat", "two strains", "1000 pores",
+             "is it fine enough", "K-porosity", "what follows detachment")
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_the_next_questions_have_a_short_answer_with_a_link(question):
+    """One section has all words of the question; it has two sentences or more, and links to the page with the rest."""
+    sections = text("docs/questions.md").split("\n## ")[1:]
+    words = set(re.findall(r"\w+", question.lower())) - {"is", "it", "what"}
+    answers = [section for section in sections if words <= set(re.findall(r"\w+", section.lower()))]
+    assert answers and len(answers[0]) < 900 and len(re.findall(r"[.:?] ", answers[0])) >= 2
+    for page, anchor in re.findall(r"\]\(([^)#]*)(?:#([^)]*))?\)", answers[0]):
+        slugs = {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-")
+                 for head in re.findall(r"^#+ (.+)$", text(f"docs/{page}"), re.M)}
+        assert not anchor or anchor in slugs, (page, anchor)
+
+
 # The examples of the README and the tutorial.
 PAGE, TUTORIAL = ROOT / "README.md", ROOT / "docs" / "tutorial.md"
 BLOCKS = blocks(PAGE)

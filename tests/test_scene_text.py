@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from runpy import run_path
 
 import pytest
 
@@ -9,6 +10,7 @@ from repro.cli import main
 from repro.scene import PRESETS, Scene, load_scene, packaged_scenes, parse_scene
 from repro.scene.reading import entries
 from repro.scene.text import scene_text
+from tests.blocks import ROOT
 
 #: Keys that exclude another one that is set: they stay commented out.
 OTHER_DRIVE = {"head", "mean_velocity"}
@@ -35,6 +37,18 @@ def uncommented(text, left_out=()):
         key = line[1:].partition(" ")[0]
         return line[1:] if re.match(r"#[\[a-z]", line) and key not in left_out else line
     return "\n".join(map(active, text.splitlines()))
+
+
+def test_the_page_of_keys_has_a_row_and_an_anchor_for_each_key():
+    """With its default, what it accepts and its source; a section has a heading."""
+    page = run_path(str(ROOT / "docs" / "site" / "scene_keys.py"))["render"]()
+    rows = {line.partition('"></a>')[0].rpartition('"')[2]: line for line in page.splitlines() if "<a id=" in line}
+    keys = {key: entry for key, entry in fields(Scene) if "section" not in entry.metadata}
+    assert rows.keys() == keys.keys() and page.count("<a id=") == len(keys)
+    assert all(re.search(rf"^## `\[{key}\]`$", page, re.M) for key, entry in fields(Scene) if key not in keys)
+    for key, entry in keys.items():
+        assert entry.metadata["kind"].accepted in rows[key] and rows[key].endswith(f"| {entry.metadata['source']} |")
+    assert '| um | a length, from 1 nm to 1 m | "100 um" |' in rows["pore.width"]
 
 
 @pytest.mark.parametrize("preset", PRESETS)

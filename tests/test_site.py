@@ -7,13 +7,14 @@ import re
 import time
 from functools import cache
 from html import unescape
-from urllib.parse import unquote, urldefrag
+from urllib.parse import quote_plus, unquote, urldefrag
 
 import pytest
 
 from paper_figures import FIGURES
 from tests import browser
 from tests.blocks import ROOT
+from tests.test_published import QUESTIONS
 from verification.claims import EXPECTED
 
 SITE = ROOT / "docs" / "_build" / "html"
@@ -102,6 +103,10 @@ def test_the_root_leads_to_the_start(window):
 def test_the_search_finds_pages(window):
     window.show(SITE / "search.html", "?q=neo-Hookean")
     assert wait_for(window, "document.querySelectorAll('#search-results li a').length >= 2")
+    for question in QUESTIONS:
+        window.show(SITE / "search.html", f"?q={quote_plus(question)}")
+        assert wait_for(window, "[...document.querySelectorAll('#search-results li a')]"
+                                ".some(link => link.href.includes('questions.html'))"), question
     window.show(SITE / "search.html", "?q=zzzznothing")
     assert wait_for(window, "/did not match/.test(document.getElementById('search-results').innerText)")
 
@@ -122,6 +127,19 @@ def test_a_table_sorts_by_keys_and_filters_its_rows(window):
                "field.value = 'flow exact'; field.dispatchEvent(new Event('input'))")
     shown = window.run(f"[...{ROWS}].filter(row => row.offsetParent).map(row => row.innerText)")
     assert 3 < len(shown) < 50 and all("flow" in row and "exact" in row for row in shown)
+
+
+def test_the_index_of_cases_has_menus(window):
+    """Menus choose stage, kind, elements and equations; those that are chosen hold together with the field."""
+    window.show(SITE / "build" / "cases" / "index.html")
+    for menu, entry in (("stage", "flow"), ("kind", "exact"), ("elements and presets", "2"), ("equations", "(1)-(6)")):
+        window.run(f"menu = document.querySelector('[aria-label=\"Choose {menu}\"]'); menu.value = '{entry}';"
+                   "menu.dispatchEvent(new Event('input'))")
+    shown = window.run(f"[...{ROWS}].filter(row => row.offsetParent)"
+                       ".map(row => [...row.cells].slice(1, 5).map(cell => cell.innerText.trim()))")
+    assert 1 < len(shown) < 20
+    for stage, kind, elements, equations in shown:
+        assert (stage, kind) == ("flow", "exact") and "2" in elements.split("; ") and "(1)-(6)" in equations
 
 
 def test_the_register_of_claims_sorts_and_filters(window):

@@ -33,14 +33,7 @@ results.plot()
 plt.show()
 
 # %% [markdown]
-# With the name of a field, `plot` draws the field over the pore at a reported time.
-
-# %% mystnb={"image": {"alt": "the acceptor in the pore at 15.2 h, with the outline of the aggregate"}}
-results.plot("acceptor", time=15.2)
-plt.show()
-
-# %% [markdown]
-# The same field is a set of NumPy arrays over the mesh. Their names end with their units.
+# The fields of a time are NumPy arrays over the mesh. Their names end with their units.
 
 # %%
 fields = results.fields(results.time[-1])
@@ -48,3 +41,11 @@ x = fields["places_um"][:, 0]
 acceptor = fields["acceptor_mg_per_L"]
 print(f"least acceptor: {acceptor.min():.2g} mg/L at x = {x[acceptor.argmin()]:.0f} um")
 assert acceptor.min() > 1
+
+# %% [markdown]
+# With the name of a field, `plot` draws the field over the pore at a reported time, and `results.animate` makes a film
+# of all times.
+
+# %% mystnb={"image": {"alt": "the acceptor in the pore at 15.2 h, with the outline of the aggregate"}}
+results.plot("acceptor", time=15.2)
+plt.show()

@@ -5,6 +5,7 @@
     charts        line charts as SVG
     colours       viridis
     fields        the fields of the .vtu files, packed for the page's script
+    answer        the beginning of a run's page: its answer, a table and a picture
     run_page, comparison   the two kinds of pages
     page          a page in one file that needs no network and escapes all text
     *.css, *.js   its style and scripts, which draw fields as SVG

@@ -25,6 +25,7 @@ COLOURS = 8
 #: A positive quantity that varies by more than this factor has a logarithmic scale.
 LOG_FROM = 30.0
 MOST_POINTS = 1000  # drawn of a line
+EQUAL = 1e-9  # relative difference of values that a chart would draw as one
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +37,24 @@ class Line:
     values: np.ndarray
     dots: bool = False  # drawn as separate dots
 
+    @property
+    def constant(self) -> bool:
+        """Whether its finite values are equal, to round-off, or there are none. Dots are not."""
+        finite = self.values[np.isfinite(self.values)]
+        largest = np.abs(finite).max(initial=0.0)
+        return not self.dots and bool(np.ptp(finite) <= EQUAL * largest if len(finite) else True)
+
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Lines over time; `axis` is the quantity with its unit; `marks` are times (h) of events."""
+    """Lines over time; `axis` is the quantity with its unit; `marks` are times (h) of events;
+    `of_mesh`: the mesh and its numerics, not the pore."""
 
     title: str
     axis: str
     lines: Sequence[Line]
     marks: Sequence[float] = ()
+    of_mesh: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from repro.report.charts import MOST_POINTS, Chart, Line
+from repro.report.charts import MOST_POINTS, Chart, Line, number
 from repro.report.reading import Run
 from repro.results import names
 from repro.results.columns import BODY, PARTS, SUBSTRATES
@@ -31,6 +31,8 @@ class Kind:
         Name of the vertical axis, without the unit.
     drawn : tuple of str
         Names of the columns that it draws, all in the same unit.
+    of_mesh : bool, optional
+        Whether it shows the mesh and its numerics, not the pore.
 
     Examples
     --------
@@ -45,13 +47,14 @@ class Kind:
     title: str
     axis_name: str
     drawn: tuple[str, ...]
+    of_mesh: bool = False
 
     def chart(self, title: str, lines: Sequence[Line], marks: Sequence[float] = ()) -> Chart:
         """Make the chart of lines in the unit of the columns; it shows a readable unit."""
         symbol, factor = names.readable_unit(self.drawn[0], [line.values for line in lines])
         axis = f"{self.axis_name} ({symbol})" if symbol else self.axis_name
         scaled = [replace(line, values=factor * np.asarray(line.values)) for line in lines]
-        return Chart(title, axis, scaled, marks)
+        return Chart(title, axis, scaled, marks, self.of_mesh)
 
 
 def mean_rates(start: np.ndarray, end: np.ndarray, amounts: np.ndarray) -> TimeSeries:
@@ -123,7 +126,7 @@ KINDS = (
     Kind("Mean velocity", "velocity", ("mean_velocity_m_per_d",)),
     Kind("Head loss", "head", ("head_loss_cm",)),
     Kind("Effluents", "concentration", _pair("effluent_{}_mg_per_L")),
-    Kind("Inlet of the meshed part", "concentration", _pair("inlet_{}_mg_per_L")),
+    Kind("Inlet of the meshed part", "concentration", _pair("inlet_{}_mg_per_L"), True),
     Kind("Least concentrations", "concentration", _pair("{}_min_mg_per_L")),
     Kind("Concentrations above the supply", "concentration", _pair("{}_overshoot_mg_per_L")),
     Kind("Area of the aggregate", "area", ("aggregate_area_um2",)),
@@ -137,8 +140,8 @@ KINDS = (
     *map(_ledger, SUBSTRATES),
     Kind("Ledger: biomass", "biomass", ("biomass_held_ug_per_m", "biomass_made_ug_per_m")),
     Kind("Defects of the balances", "relative defect",
-         (*_pair("{}_balance"), "biomass_balance", "oxygen_demand_balance")),
-    Kind("Mesh", "nodes", ("nodes", "remeshed_nodes")),
+         (*_pair("{}_balance"), "biomass_balance", "oxygen_demand_balance"), True),
+    Kind("Mesh", "nodes", ("nodes", "remeshed_nodes"), True),
 )
 
 
@@ -174,16 +177,57 @@ def series(run: Run) -> dict[str, TimeSeries]:
 
 
 def charts_of(run: Run) -> list[Chart]:
-    """Make the charts of one run; none for a single row."""
-    if len(run.times) < 2:
-        return []
-    drawable, marks = series(run), contact(run)
-    drawn_charts = []
+    """Make the charts of one run; none for a single row.
+
+    A chart needs a quantity that changes. A quantity that is zero throughout is not drawn.
+    """
+    marks = contact(run)
+    return [kind.chart(_title(kind, lines), [*lines.values()], marks)
+            for kind, lines in _split(run, constant=False)]
+
+
+def constants_of(run: Run) -> list[str]:
+    """Return the quantities that the charts of a run leave out because they are constant.
+
+    A text is "words: value unit".
+    """
+    return [_constant(name, line) for _, lines in _split(run, constant=True)
+            for name, line in lines.items()]
+
+
+def _split(run: Run, constant: bool) -> list[tuple[Kind, dict[str, Line]]]:
+    """Return the lines of each kind that are drawn, or those that are texts; kinds with any.
+
+    Lines without a finite value are neither.
+    """
+    drawable = series(run) if len(run.times) > 1 else {}
+    split = []
     for kind in kinds(drawable):
-        lines = [_line(_label(name), name, drawable) for name in kind.drawn if name in drawable]
-        if lines:
-            drawn_charts.append(kind.chart(kind.title, lines, marks))
-    return drawn_charts
+        lines = {name: _line(_label(name), name, drawable) for name in kind.drawn
+                 if name in drawable}
+        changing = any(not line.constant and not line.dots for line in lines.values())
+        chosen = {name: line for name, line in lines.items()
+                  if _is_text(line, changing) == constant and not (constant and line.dots)}
+        split += [(kind, chosen)] if chosen else []
+    return split
+
+
+def _is_text(line: Line, changing: bool) -> bool:
+    """Whether a line is zero throughout, or no line of its chart changes."""
+    return not changing or (line.constant and not np.nan_to_num(line.values).any())
+
+
+def _title(kind: Kind, lines: dict[str, Line]) -> str:
+    """Return the title of a chart, with the label of its only line among several."""
+    (first, *others) = lines.values()
+    return kind.title if others or len(kind.drawn) == 1 else f"{kind.title}: {first.label}"
+
+
+def _constant(name: str, line: Line) -> str:
+    symbol, factor = names.readable_unit(name, [line.values])
+    value = factor * line.values[np.isfinite(line.values)][0]
+    known = KNOWN.get(name)
+    return f"{known.words if known else names.words(name)}: {number(value)} {symbol}".rstrip()
 
 
 def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:

@@ -6,7 +6,7 @@ import html
 
 import numpy as np
 
-from repro.report import charts, fields, page, quantities
+from repro.report import answer, charts, fields, page, quantities
 from repro.report.colours import viridis
 from repro.report.reading import Run
 from repro.results import names
@@ -59,7 +59,7 @@ font-family="system-ui, sans-serif"></svg></div>\
 
 def build(run: Run) -> str:
     """The text of the page. Raises OutputError if a file of fields cannot be read."""
-    drawn = _charts(run, quantities.charts_of(run))
+    drawn = _charts(run)
     packed = _packed(run, len(drawn))
     body = (_head(run) + _fields(run, packed) + drawn
             + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run)
@@ -95,17 +95,10 @@ def _head(run: Run) -> str:
     modelled = [words for name, words in PHYSICS.items() if name in run.record["tables"]]
     return (f"<header><h1>{html.escape(run.record['scene'])}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>'
-            f"{_rows_note(run)}"
+            f"{answer.build(run)}"
             f"{_warnings(run)}"
             f"<p>{html.escape(_sentence(modelled))} {html.escape(_assumed(run))} "
             f"{html.escape(_numerics(run))}</p></header>\n")
-
-
-def _rows_note(run: Run) -> str:
-    """The number of rows and their last time; empty for a single row."""
-    if len(run.times) < 2:
-        return ""
-    return f'<p class="note">{len(run.times)} rows, to t = {run.times[-1]:g} h.</p>'
 
 
 def _warnings(run: Run) -> str:
@@ -188,18 +181,33 @@ def _times_note(count: int, total: int) -> str:
     return f"all {total} times shown" if total > 1 else "one time"
 
 
-def _charts(run: Run, drawn: list[charts.Chart]) -> str:
+def _charts(run: Run) -> str:
+    """Charts of the pore and, apart from them, of the mesh and its numerics."""
+    drawn = quantities.charts_of(run)
     if not drawn:
         return ""
+    constant = quantities.constants_of(run)
+    of_pore, of_mesh = ([chart for chart in drawn if chart.of_mesh == apart]
+                        for apart in (False, True))
+    listed = f"<p>Constant: {html.escape('; '.join(constant))}.</p>" if constant else ""
+    return (page.section("Over time", _charts_note(run), listed, _figures(of_pore))
+            + page.section("Of the mesh and the balances, not of the pore", _figures(of_mesh)))
+
+
+def _figures(drawn: list[charts.Chart]) -> str:
+    """Charts side by side; empty without any."""
+    figures = "".join(map(charts.svg, drawn))
+    return f'<div class="charts">{figures}</div>' if figures else ""
+
+
+def _charts_note(run: Run) -> str:
     note = ("Point at a chart for its values, or focus it and press the arrow keys; a click or "
             "Enter shows the fields of that time.")
     if touching := quantities.contact(run):
         note += f" Dotted: contact with the opposite wall, t = {touching[0]:.6g} h."
     if len(run.times) > charts.MOST_POINTS:
         note += f" {charts.MOST_POINTS} of {len(run.times)} rows are drawn."
-    figures = "".join(map(charts.svg, drawn))
-    return page.section("Over time", f'<p class="note">{note}</p>',
-                        f'<div class="charts">{figures}</div>')
+    return f'<p class="note">{note}</p>'
 
 
 def _numbers(run: Run) -> str:

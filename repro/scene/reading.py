@@ -28,9 +28,11 @@ NOT_MODELLED = {
     "aggregate": ("several aggregates are tables [[aggregate]]",
                   "aggregates seeds colony colonies clusters"),
     "pore": ("one pore is modelled, a straight channel",
-             "pores throat throats grains network column aquifer"),
+             "pores throat throats grains network column aquifer inlet outlet shape converging "
+             "roughness"),
     "substrates": ("one acceptor and one donor are modelled",
-                   "substrates acceptors donors nitrate nitrite ammonium sulfate"),
+                   "substrates acceptors donors oxygen nitrate nitrite ammonium sulfate acetate "
+                   "glucose phenol"),
     "kinetics": ("one species of bacteria is modelled", "strain strains species"),
     "": ('"{word}" is not modelled',
          "attachment detachment erosion sloughing depth dimension dimensions temperature inertia "

@@ -81,7 +81,7 @@ def _table(path: str, entry: Field, written: dict, part: object,
     for key, field in entries(kind).items():
         if key not in inner:
             yield from _comment(_about(field))
-            yield from _comment(f"{field.metadata['kind'].accepted}; {_stated(kind, key, field)}")
+            yield from _comment(f"{field.metadata['kind'].accepted}; {stated(kind, key, field)}")
             value = written[key] if key in written else _default(field, getattr(part, key, None))
             yield f"{'' if key in written else '#'}{key} = {_toml(value)}"
     for key, field in inner.items():
@@ -93,7 +93,7 @@ def _about(field: Field) -> str:
     return f"{field.metadata['about']}. {source if source == NOT_IN_PAPER else f'Paper: {source}'}."
 
 
-def _stated(kind: type, key: str, field: Field) -> str:
+def stated(kind: type, key: str, field: Field) -> str:
     """The value of a key that a scene does not set, in words."""
     if field.metadata["stated"]:
         return field.metadata["stated"]

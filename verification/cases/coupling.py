@@ -415,8 +415,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
     "coupling-midpoint-order", kind="property", mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"),
     runs_with="fast",
     omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps have no tolerance, as in fast")
-@pytest.mark.parametrize("elements", [pytest.param(each, marks=pytest.mark.slow if each == "quadratic" else ())
-                                      for each in runs.ELEMENTS])
+@parametrize("elements", {each: (each,) for each in runs.ELEMENTS}, slow=("quadratic",))
 def test_midpoint_order(elements, record):
     """The midpoint rule is of second order in time, with every kind of elements.
 

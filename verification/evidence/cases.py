@@ -19,7 +19,10 @@ import pytest
 from verification.evidence.writing import ROOT
 
 FOLDER = ROOT / "verification" / "cases"
-KINDS = ("exact", "manufactured", "cross-code", "property")
+#: What each kind of case compares with.
+KINDS = {"exact": "a closed form", "manufactured": "a solution that was chosen", "cross-code": "another code",
+         "property": "a conserved quantity, a symmetry or a limit", "benchmark": "a published problem",
+         "validation": "a measurement"}
 #: Modules of a stage begin with its name: flow.py, flow_codes.py.
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 #: Numerics that a case may run with: elements of order 1 and 2, and the presets of whole scenes.

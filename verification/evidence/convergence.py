@@ -36,9 +36,10 @@ def _two_digits(values: np.ndarray) -> list[float]:
 
 def draw(cases: Mapping[str, Mapping[str, list]], target: Path) -> None:
     """Write the picture of the series of some cases: {case: {quantity: series}}."""
-    rows = -(-len(cases) // COLUMNS)
-    figure = Figure(figsize=(9, 3.3 * rows + 0.2), layout="constrained")
-    axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+    columns = min(COLUMNS, len(cases))
+    rows = -(-len(cases) // columns)
+    figure = Figure(figsize=(4.5 * columns, 3.3 * rows + 0.2), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for axis, case in zip_longest(axes, cases):
         if case is None:
             axis.remove()

@@ -1,4 +1,5 @@
-// Sort a table by a click or Enter on a heading; tables of twelve rows or more get a field that filters their rows.
+// Sort a table by a click or Enter on a heading; tables of twelve rows or more get a field that filters their rows, and
+// long ones a menu for each column of few different entries.
 // A column of long texts has a least width, and a table wider than the page scrolls within it.
 "use strict";
 
@@ -39,14 +40,39 @@ function addFilter(table) {
   field.placeholder = "Filter the rows";
   field.setAttribute("aria-label", "Filter the rows of the table");
   const rows = [...table.tBodies[0].rows];
-  field.addEventListener("input", () => {
+  const menus = [...table.tHead.rows[0].cells].map((heading) => menuOf(heading, rows)).filter(Boolean);
+  const filter = () => {
     const words = field.value.toLowerCase().split(/\s+/);
     for (const row of rows) {
       const text = row.innerText.toLowerCase();
-      row.hidden = !words.every((word) => text.includes(word));
+      row.hidden = !(words.every((word) => text.includes(word)) && menus.every((menu) => menu.accepts(row)));
     }
-  });
-  (table.closest(".table-wrapper") || table).before(field);
+  };
+  const place = table.closest(".table-wrapper") || table;
+  for (const { element } of [{ element: field }, ...menus]) {
+    element.addEventListener("input", filter);
+    place.before(element);
+  }
+}
+
+// A column of a long table has a menu if its cells, lists with semicolons, have few entries that are not numbers.
+const LONG_TABLE = 60;
+const MOST_ENTRIES = 30;
+
+function entries(row, column) {
+  return cellText(row, column).split("; ").filter(Boolean);
+}
+
+function menuOf(heading, rows) {
+  const column = heading.cellIndex;
+  const known = [...new Set(rows.flatMap((row) => entries(row, column)))].sort();
+  const isNumeric = known.every((entry) => !Number.isNaN(Number(entry)));
+  if (rows.length < LONG_TABLE || known.length < 2 || known.length > MOST_ENTRIES || isNumeric) return null;
+  const element = document.createElement("select");
+  element.className = "table-menu";
+  element.setAttribute("aria-label", `Choose ${heading.innerText.trim()}`);
+  element.append(new Option(`${heading.innerText.trim()}: all`, ""), ...known.map((entry) => new Option(entry)));
+  return { element, accepts: (row) => !element.value || entries(row, column).includes(element.value) };
 }
 
 // Least widths of columns by the length of their longest text; longer words are broken.

@@ -1,0 +1,69 @@
+"""The pages of the verification cases on the site."""
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from repro.fem.mesh import triangle_areas
+from tests.blocks import ROOT
+from verification.evidence import case_pages, first_mesh, pages
+from verification.evidence.cases import KINDS, STAGES, cases
+from verification.problems import meshes
+
+RECORDS = pages.recorded()
+
+
+def test_a_page_has_claim_norm_numbers_mutants_and_the_command(tmp_path):
+    """Each picture has its place if its file exists. A case that falls short says so."""
+    case = cases()["flow-plug"]
+    (tmp_path / "flow-plug.svg").touch()
+    text = "\n".join(case_pages.article(case, RECORDS["flow-plug"], tmp_path))
+    assert case.claim in text and case.norm in text and "kind | exact" in text and "(1)-(6)" in text
+    assert all(all(cell in text for cell in row) for row in RECORDS["flow-plug"]["table"])
+    assert re.search(r"tau-of-water \| The stabilisation .+ \| repro/model/flow.py \| flow-plug", text)
+    assert "(./flow-plug.svg)" in text and "flow-plug.png" not in text
+    assert "pytest verification/cases/flow.py::test_plug\n" in text and "refine(_plug_errors, PLUG_SIZES)" in text
+    short = {"verdict": "FALLS SHORT", "numbers": 1, "errors": ["v = 2: ValueError"], "table": [["q", "1", "o", "NO"]]}
+    text = "\n".join(case_pages.article(case, short, tmp_path))
+    assert all(part in text for part in ("**FALLS SHORT**", "by an error: v = 2: ValueError", "| q | 1 | o | NO |"))
+
+
+def test_the_index_has_a_line_a_case_with_stage_kind_elements_and_equations(monkeypatch):
+    monkeypatch.setattr(pages, "mutant_state", str)
+    rows = [line.split(" | ") for line in case_pages.index(RECORDS)[-1].splitlines()[2:]]
+    assert [row[0] for row in rows] == [f"| [{id}]({id}.md)" for id in cases()]
+    assert {row[1] for row in rows} == {*STAGES} and {row[2] for row in rows} <= {*KINDS}
+    assert all(row[3] and row[4] for row in rows)
+
+
+def test_every_command_chooses_the_case_among_those_of_its_function():
+    """A function that has several cases needs an expression. It excludes ids that contain the id."""
+    commands = {id: case_pages.command(case) for id, case in cases().items()}
+    assert commands["hard-pores"].endswith('hard_pores.py::test_pore -k "hard-pores and not hard-pores-rest"')
+    assert commands["hard-pores-rest"].endswith('hard_pores.py::test_pore -k "hard-pores-rest"')
+    assert len({*commands.values()}) == len(commands)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_drawing_shows_the_biomass_where_it_is(order, tmp_path):
+    """The share of its colour is that of its area, and it is below the water."""
+    mesh = meshes.half_disc(20.0, 0.25, (-40.0, 40.0), 50.0, geometry=order)
+    first_mesh.draw(mesh, tmp_path / "mesh.png")
+    pixels = np.asarray(Image.open(tmp_path / "mesh.png").convert("RGB"), int)
+    water, biomass = (np.abs(pixels - [*bytes.fromhex(colour[1:])]).sum(axis=2) < 30 for colour in first_mesh.COLOURS)
+    areas = triangle_areas(mesh.points, mesh.triangles)
+    share = areas[mesh.biomass].sum() / areas.sum()
+    assert biomass.sum() / (water.sum() + biomass.sum()) == pytest.approx(share, rel=0.1)
+    assert np.nonzero(biomass)[0].mean() > np.nonzero(water)[0].mean()
+
+
+@pytest.mark.thorough
+def test_a_case_is_drawn_by_its_first_mesh_or_not_at_all(tmp_path):
+    """One case makes a mesh; the other has formulas alone. Both stop without a verdict."""
+    subprocess.run([sys.executable, "-m", "verification.evidence.first_mesh", tmp_path, "flow-plug", "growth-stress"],
+                   check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+    assert [path.name for path in tmp_path.iterdir()] == ["flow-plug.png"]
