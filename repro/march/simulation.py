@@ -15,7 +15,7 @@ from repro.march.step_control import STRETCH, StepControl
 from repro.model.grading import solve_graded
 from repro.model.meshing import seeded
 from repro.scene import Scene, SceneError, Source, load_scene, parse_scene, scene_tables
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.schemes import Scheme
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ Shape = Sequence[tuple[float, float]] | np.ndarray
 
 
 @typed
-def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+def simulate(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
              scheme: Scheme | None = None, shape: Shape | None = None,
              state: RestartState | None = None) -> Iterator[Report]:
     """Simulate a scene, and yield a Report at t = 0 and at each reported time.
@@ -39,7 +39,7 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
     ----------
     scene : Scene, str, Path or dict
         A loaded scene, the name of a packaged scene, a TOML file, or a dict of tables.
-    overrides : sequence of str, optional
+    overrides : sequence of str or dict, optional
         Changes of the scene, as for :func:`repro.load_scene`.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.

@@ -20,7 +20,7 @@ from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
 from repro.scene import Source, load_scene, scene_tables
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.scene.units import to_internal
 from repro.schemes import Scheme
 from repro.timing import progress_bar
@@ -409,7 +409,7 @@ def package(name: str):
 
 
 @typed
-def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+def solve(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
           scheme: Scheme | None = None, progress: bool = False) -> Results:
     """Run a scene and keep its rows and fields in memory.
 
@@ -417,8 +417,8 @@ def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
     ----------
     scene : Scene, str, path or dict
         A loaded scene, a packaged name, a file, or a dict of tables.
-    overrides : sequence of str
-        Texts "KEY=VALUE" that set keys of the scene.
+    overrides : sequence of str or dict, optional
+        Changes of the scene, as for :func:`repro.load_scene`.
     unset : sequence of str
         Keys to leave out.
     scheme : repro.schemes.Scheme, optional

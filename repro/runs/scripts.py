@@ -18,12 +18,12 @@ from repro.runs import execution
 from repro.runs.execution import Watch, issue_warnings, origin_of
 from repro.runs.folder import read_sums
 from repro.scene import Source, load_scene
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.timing import progress_bar
 
 
 @typed
-def run(scene: Source, folder: str | Path, overrides: Sequence[str] = (), *,
+def run(scene: Source, folder: str | Path, overrides: Overrides = (), *,
         unset: Sequence[str] = (), force: bool = False, progress: bool = False) -> Results:
     """Run a scene and write its results to a folder.
 
@@ -36,8 +36,8 @@ def run(scene: Source, folder: str | Path, overrides: Sequence[str] = (), *,
         A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
     folder : str or Path
         Folder for the results. It is created if it does not exist.
-    overrides : sequence of str, optional
-        Changes of the scene, such as ``['growth.end="5 h"']``.
+    overrides : sequence of str or dict, optional
+        Changes of the scene, such as ``{"growth.end": "5 h"}``.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
     force : bool, optional
@@ -79,7 +79,7 @@ def run(scene: Source, folder: str | Path, overrides: Sequence[str] = (), *,
 
 
 @typed
-def resume(folder: str | Path, overrides: Sequence[str] = (), *,
+def resume(folder: str | Path, overrides: Overrides = (), *,
            progress: bool = False) -> Results:
     """Resume a run that was interrupted, was killed or has failed, or make a run longer.
 
@@ -90,8 +90,8 @@ def resume(folder: str | Path, overrides: Sequence[str] = (), *,
     ----------
     folder : str or Path
         Folder of the run.
-    overrides : sequence of str, optional
-        A later end, such as ``['growth.end="30 h"']``. No other key can be changed. The longer run
+    overrides : sequence of str or dict, optional
+        A later end, such as ``{"growth.end": "30 h"}``. No other key can be changed. The longer run
         equals a run that had this end from its start.
     progress : bool, optional
         Show a bar of the simulated time (h), by ``tqdm.auto``.

@@ -10,7 +10,7 @@ and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguit
 """
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from copy import deepcopy
 from dataclasses import MISSING, asdict, dataclass, field, replace
 from fractions import Fraction
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from repro.scene import bodies
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
@@ -638,7 +638,7 @@ KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among t
 
 
 @typed
-def load_scene(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+def load_scene(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
                scheme: Scheme | None = None) -> Scene:
     """Load a scene, with changes.
 
@@ -647,8 +647,9 @@ def load_scene(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[
     scene : Scene, str, Path or dict
         A TOML file, the name of a packaged scene, a dict of tables like those of a file, or a
         loaded scene. Lists of a dict may be tuples or arrays, its numbers scalars of NumPy.
-    overrides : sequence of str, optional
-        Changes "KEY=VALUE", like those of ``--set``: dotted keys, values in TOML with units.
+    overrides : sequence of str or dict, optional
+        Changes: texts "KEY=VALUE", like those of ``--set``, with values in TOML with units; or a
+        dict of values by dotted keys, among them values of NumPy and quantities of pint.
     unset : sequence of str, optional
         Dotted keys or sections to leave out, like those of ``--unset``; before ``overrides``.
     scheme : repro.schemes.Scheme, optional
@@ -690,7 +691,7 @@ def label(source: Source) -> str:
     return "scene" if isinstance(source, dict) else str(source)
 
 
-def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> dict:
+def load_tables(source: Source, overrides: Collection[str] = (), unset: Sequence[str] = ()) -> dict:
     """Load the tables of a scene without checks, and apply --unset and then --set."""
     file = label(source)
     if isinstance(source, Scene):

@@ -109,13 +109,12 @@ class Quantity:
         return f'{NOUNS[self.unit]} is needed, such as "{self.example}" ({self.accepts.words})'
 
     def near(self, value: object) -> str:
-        """Suggest a plain number with the unit of the example, or the text of pint's quantity."""
+        """Suggest a plain number with the unit of the example."""
         endless = isinstance(value, int) and abs(value) >= 10**LONGEST
         if isinstance(value, bool) or endless:
             return ""
         plain = isinstance(value, Real | str) and re.fullmatch(_DIGITS, f"{value}")
         meant = f"{value} {self.usual_unit}" if plain else ""
-        meant = str(value) if hasattr(value, "units") else meant
         return f'"{meant}"' if _takes(self, meant) else ""
 
     def read(self, value: object) -> float:
@@ -257,6 +256,7 @@ class Number:
         return "" if match[2] and _has_dimensionless_factor(match[2]) else match[1]
 
     def read(self, value: object) -> float:
+        value = plain(value) if hasattr(value, "magnitude") else value
         if isinstance(value, bool) or not isinstance(value, Real):
             has_moles = isinstance(value, str) and _MOLES.search(value[:LONGEST])
             raise ValueError(NO_MOLES if has_moles else _fault(value))
@@ -510,6 +510,7 @@ def to_internal(value: object, unit: str) -> float:
 
 def _parts(value: object) -> tuple[str, str]:
     """Split a number with a unit into its digits and the unit. Raises ValueError for others."""
+    value = plain(value) if hasattr(value, "magnitude") else value
     text = value.translate(_PRINTED) if isinstance(value, str) and len(value) <= LONGEST else ""
     match = _QUANTITY.fullmatch(text)
     if match is None:
@@ -571,13 +572,27 @@ def _table_parts(value: object) -> tuple[object, list | None]:
 
 def as_list(value: object) -> list | None:
     """Return a list, a tuple or an array as a list; None for other values."""
-    plain = without_numpy(value)
-    return list(plain) if isinstance(plain, list | tuple) else None
+    listed = plain(value)
+    return list(listed) if isinstance(listed, list | tuple) else None
 
 
-def without_numpy(value):
-    """Return a scalar or an array of NumPy as a number or a list, and other values unchanged."""
+def plain(value):
+    """Return a value of NumPy or pint in the types of a TOML file, and other values unchanged.
+
+    An array is a list. A quantity, which has ``magnitude`` and ``units``, is a text such as
+    "50.0 micrometer", or a number if it is dimensionless.
+    """
+    if hasattr(value, "magnitude") and hasattr(value, "units"):
+        unit = str(value.units).replace(" ** ", "^")
+        return _with_unit(plain(value.magnitude), "" if unit == "dimensionless" else unit)
     return value.tolist() if type(value).__module__ == "numpy" else value
+
+
+def _with_unit(magnitude, unit: str):
+    """Return a magnitude, a number or a nested list of numbers, with its unit."""
+    if isinstance(magnitude, list):
+        return [_with_unit(each, unit) for each in magnitude]
+    return f"{float(magnitude)!r} {unit}" if unit else magnitude
 
 
 def _each(noun: str, read: Callable, values: list) -> Iterator:

@@ -519,8 +519,8 @@ MUTANTS = (
         ("tuples-refused",
          "A tuple is not accepted as a list.",
          "as_list",
-         "isinstance(plain, list | tuple)",
-         "isinstance(plain, list)",
+         "isinstance(listed, list | tuple)",
+         "isinstance(listed, list)",
          "tests/test_scene_refusals.py::test_values_of_numpy_and_tuples_are_accepted")),
     *changes(
         "repro/scene/reading.py",
@@ -1617,6 +1617,22 @@ MUTANTS = (
          "execution.resume(folder, overrides, watch=watch)",
          "execution.resume(folder, watch=watch)",
          "tests/test_python_calls.py::test_a_run_takes_overrides_and_a_list_extends_it")),
+    *changes(
+        "repro/scene/units.py",
+        ("units-of-a-quantity-lost",
+         "The magnitude of a quantity of pint is taken in um, whatever its units.",
+         "_with_unit",
+         'f"{float(magnitude)!r} {unit}"',
+         'f"{float(magnitude)!r} um"',
+         "tests/test_python_calls.py::test_overrides_are_a_dict_with_values_of_numpy_and_pint")),
+    *changes(
+        "repro/scene/reading.py",
+        ("tables-of-a-dict-flattened",
+         "A table in a dict of overrides is written as JSON.",
+         "toml_value",
+         "isinstance(value, dict)",
+         "False",
+         "tests/test_python_calls.py::test_overrides_are_a_dict_with_values_of_numpy_and_pint")),
     *changes(
         "repro/scene/arguments.py",
         ("a-text-is-a-list",
