@@ -45,9 +45,12 @@ def test_a_run_takes_overrides_and_a_list_extends_it(tmp_path):
 
 
 WRONG = [
-    (repro.run, ("base", "out", "growth.end=1 h"), {}, "run: overrides: a list of str or dict is needed, not 'growth.end=1 h'"),
-    (repro.run, ("base", "out", lambda time: None), {}, "run: overrides: a list of str or dict is needed, not a function"),
-    (repro.run, ("base", "out", [1]), {}, r"run: overrides: a list of str or dict is needed, not \[1\]"),
+    (repro.run, ("base", "out", "growth.end=1 h"), {},
+     "run: overrides: a list of str or dict is needed, not 'growth.end=1 h'"),
+    (repro.run, ("base", "out", lambda time: None), {},
+     "run: overrides: a list of str or dict is needed, not a function"),
+    (repro.run, ("base", "out", [1]), {},
+     r"run: overrides: a list of str or dict is needed, not \[1\]"),
     (repro.run, (3, "out"), {}, "run: scene: Scene or str or Path or dict is needed, not 3"),
     (repro.run, ("base", "out"), {"progress": print}, "run: progress: bool is needed, not <built-in function print>"),
     (repro.resume, (None,), {}, "resume: folder: str or Path is needed, not None"),

@@ -15,16 +15,22 @@ from repro import results
 from repro.errors import RunEnd
 from repro.march.simulation import simulate
 from repro.march.state import SAME_TIME
-from repro.results import drawing, names, netcdf, picture
+from repro.results import drawing, names, netcdf, outlines, picture
+from repro.results.drawing import Photograph, Style
 from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
+from repro.results.outlines import Outline
 from repro.results.quantities import plain as unit
-from repro.scene import Source, load_scene, scene_tables
+from repro.scene import Source, bodies, load_scene, scene_tables
 from repro.scene.arguments import Overrides, typed
 from repro.scene.units import to_internal
 from repro.schemes import Scheme
 from repro.timing import progress_bar
 
+#: The name of the picture of all outlines.
+OUTLINES = "outlines"
+#: Number of outlines that a picture shows, if no times are given.
+MOST_OUTLINES = 10
 #: Number of first and of last times in the table of a notebook.
 END_TIMES = 5
 
@@ -162,20 +168,85 @@ class Results(Mapping[str, np.ndarray]):
                 f"{self.time[-1]:.6g} h")
 
     @typed
-    def plot(self, name: str | None = None, *, time: float | str | None = None,
-             ax: Any = None) -> Any:
-        r"""Draw the run with matplotlib: curves over time, one column, or a field.
+    def outline(self, time: float | str, body: str | int | None = None) -> Outline:
+        """Return the boundary of an aggregate at a time, as :meth:`fields` takes it.
+
+        Parameters
+        ----------
+        time : float or str
+            Hours, or a text with a unit.
+        body : str or int, optional
+            Name of the aggregate, or its number from 1; needed if there are several.
+
+        Returns
+        -------
+        Outline
+            NumPy reads it as an (n, 2) array in um, from the upstream end on the wall of the
+            aggregate to the downstream one. ``to_shapely`` returns the area inside.
+
+        Raises
+        ------
+        KeyError
+            If the aggregate is not in the pore at this time, or as for :meth:`fields`.
+        ValueError
+            If there are several aggregates and none of them is named.
+
+        Examples
+        --------
+        >>> import numpy as np, repro
+        >>> outline = repro.solve("base", {"growth.end": "0.4 h"}).outline("24 min")
+        >>> round(float(np.asarray(outline)[:, 1].max()), 2)
+        5.19
+        """
+        numbers = self._bodies
+        chosen = next(iter(numbers), "1") if body is None and len(numbers) < 2 else str(body)
+        if chosen not in (*numbers, *map(str, range(1, len(numbers) + 1)), "1"):
+            raise ValueError(f"body: one of {', '.join(numbers)} is needed, not {body!r}")
+        number = list(numbers).index(chosen) + 1 if chosen in numbers else int(chosen)
+        upper = "upper" in list(numbers.values())[number - 1:number]
+        return outlines.outline(self.fields(time), number, upper, _hours(time))
+
+    @property
+    def _bodies(self) -> dict[str, str]:
+        """The wall of each aggregate of the scene by its name, or by its number from 1."""
+        part: Any = self.tables.get(bodies.SECTION, [])
+        seeds = [part] if isinstance(part, dict) else part
+        labels = bodies.labels([seed.get("name") for seed in seeds])
+        return {label: seed.get("wall", "lower") for label, seed in zip(labels, seeds)}
+
+    @typed
+    def plot(self, name: str | None = None, *, time: float | str | Sequence | None = None,
+             ax: Any = None, log: bool | None = None, unit: str | None = None,
+             title: str | None = None, cmap: str | None = None, image: Any = None,
+             um_per_pixel: float | None = None, corner: Sequence | None = None) -> Any:
+        r"""Draw the run with matplotlib: curves over time, one column, a field, or outlines.
 
         Parameters
         ----------
         name : str, optional
-            A column or a field, with its unit or without. By default, the curves of conductivity,
-            thickness and effluents are drawn that the scene has.
-        time : float or str, optional
-            Reported time of the field: hours, or a text with a unit. By default it is the last one.
+            A column or a field, with its unit or without, or "outlines". By default, the curves of
+            conductivity, thickness and effluents are drawn that the scene has.
+        time : float, str or list of these, optional
+            Time of the field, or times of the outlines: hours, or texts with a unit. By default it
+            is the last row, and for outlines ten rows or fewer at equal intervals.
         ax : matplotlib.axes.Axes or list of these, optional
             Axes to draw in, by default those of a new figure. Curves need as many as they have
             panels.
+        log : bool, optional
+            Show the quantity on a logarithmic scale. By default, a curve has one if it is positive
+            and spans two decades.
+        unit : str, optional
+            The unit of the quantity, such as "cm/s", or of the places of outlines.
+        title, cmap : str, optional
+            The title of the picture, and the name of matplotlib's map of colours.
+        image : str, Path or array, optional
+            A microscope image under outlines: its file, or its pixels (rows, columns), whose unit
+            of length is ``um_per_pixel``.
+        um_per_pixel : float, optional
+            Scale of the image, um; needed with it.
+        corner : (x, y), optional
+            Place of the image's lower left corner, um. By default, the middle of its lower edge is
+            at x = y = 0, the middle of the lower wall.
 
         Returns
         -------
@@ -187,33 +258,81 @@ class Results(Mapping[str, np.ndarray]):
         ImportError
             If matplotlib is not installed; names the extra to install.
         KeyError
-            If the run has no column and no field of this name, or no row at this time: names the
-            rows beside it.
+            If the run has no column and no field of this name, or no state at this time.
         ValueError
-            If a time is given without a field, a text is not a time, or ``ax`` has another number
-            of axes.
+            If a time is given without a field, a text is not a time, a unit is not one of the
+            quantity, or ``ax`` has another number of axes.
 
         Examples
         --------
         >>> import repro
-        >>> results = repro.solve("base", ['growth.end="1 h"'])
+        >>> results = repro.solve("base", {"growth.end": "1 h"})
         >>> [panel.get_ylabel() for panel in results.plot()]
         ['conductivity\n(m/day)', 'thickness\n(um)', 'effluent\n(mg/L)']
         >>> results.plot("acceptor", time=0.6).get_title(loc="left")
         'base, t = 0.6 h: acceptor (mg/L)'
+        >>> results.plot("conductivity", unit="cm/s", log=True).get_ylabel()
+        'conductivity\n(cm/s)'
+        >>> len(results.plot("outlines", time=[0, "24 min", 1]).collections[-1].get_segments())
+        3
         """
-        row = len(self.time) - 1 if time is None else self._row(time)
+        style = Style(log, unit, title, cmap)
         column = drawing.full_name(name or "", list(self.columns))
+        if name != OUTLINES and (image is not None or um_per_pixel or corner):
+            raise ValueError(f'image, um_per_pixel, corner: "{OUTLINES}" are drawn over an image')
         if name is None or column:
             if time is not None:
                 raise ValueError(f"time: {column or 'a plot without a name'} is drawn over all "
                                  "times; the name of a field is needed")
+            if unit is not None and not column:
+                raise ValueError("unit: the name of a column is needed with it")
             panels: Sequence[Sequence[str]] = [(column,)] if column else self._panels()
-            axes = drawing.curves(self, panels, ax)
+            axes = drawing.curves(self, panels, ax, style)
             return axes[0] if column else axes
-        fields = self._fields[row] if row >= 0 else {}
-        title = drawing.heading(self, self.time[row]) if row >= 0 else ""
-        return drawing.field(fields, self._field(name, fields), title, ax)
+        if name == OUTLINES:
+            times = _evenly(self.time) if time is None else np.array(time, dtype=object)
+            under = _photograph(image, um_per_pixel, corner)
+            return self._plot_outlines(np.atleast_1d(times), ax, under, style)
+        if isinstance(time, Sequence) and not isinstance(time, str):
+            raise TypeError("plot: time: one time of a field is needed, not a list")
+        hours = (self.time[-1] if len(self.time) else 0.0) if time is None else _hours(time)
+        fields = self.fields(hours) if len(self.time) else {}
+        full_name = self._field(name, fields)
+        heading = title or drawing.heading(self, hours)
+        return drawing.field(fields, full_name, heading, ax, style=style)
+
+    def _plot_outlines(self, times: np.ndarray, ax: Any, photograph: Photograph | None,
+                       style: Style) -> Any:
+        """Draw the outlines of all aggregates at times."""
+        lines = []
+        for time in times:
+            present = np.unique(self.fields(time)["region"].round()).astype(int)
+            lines += [self.outline(time, int(number)) for number in present if number]
+        if not lines:
+            raise KeyError(f"{OUTLINES}: this run has no aggregate at these times")
+        box = drawing.corners(self.fields(times[-1]))
+        heading = style.title or self.name
+        return drawing.drawn_outlines(lines, heading, box, ax, photograph, style)
+
+    def drawable(self) -> dict[str, str]:
+        """Return what :meth:`plot` draws.
+
+        Returns
+        -------
+        dict of str
+            Words and unit of each column and field of the last row by name, and of "outlines".
+
+        Examples
+        --------
+        >>> import repro
+        >>> repro.solve("flow_only").drawable()["head_loss_cm"]
+        'head loss over the whole pore (cm)'
+        """
+        fields = self._fields[-1] if len(self._fields) else {}
+        known = [name for name in (*self.columns, *fields)
+                 if name not in (TIME, "places_um", "triangles")]
+        outlined = {OUTLINES: "outlines of the aggregates over time"} if self._bodies else {}
+        return {name: names.with_unit(name) for name in known} | outlined
 
     def _panels(self) -> list[tuple[str, ...]]:
         """Find the columns of each panel of curves. Raises KeyError if the scene has none."""
@@ -233,7 +352,8 @@ class Results(Mapping[str, np.ndarray]):
         return field
 
     @typed
-    def animate(self, name: str, file: str | Path, *, ax: Any = None) -> Any:
+    def animate(self, name: str, file: str | Path, *, ax: Any = None, log: bool | None = None,
+                unit: str | None = None, title: str | None = None, cmap: str | None = None) -> Any:
         """Write a field at all reported times as a film, with one scale of colours.
 
         Parameters
@@ -241,9 +361,11 @@ class Results(Mapping[str, np.ndarray]):
         name : str
             A field, with its unit or without.
         file : str or Path
-            File to write; it ends in .gif.
+            File to write; it ends in .gif, or in .mp4 where the program ffmpeg is installed.
         ax : matplotlib.axes.Axes, optional
             Axes to draw in, by default those of a new figure.
+        log, unit, title, cmap : optional
+            As for :meth:`plot`.
 
         Returns
         -------
@@ -253,7 +375,7 @@ class Results(Mapping[str, np.ndarray]):
         Raises
         ------
         ImportError
-            If matplotlib is not installed; names the extra to install.
+            If matplotlib, or ffmpeg for .mp4, is not installed; names what to install.
         KeyError
             If the run has no field of this name.
         ValueError
@@ -269,10 +391,11 @@ class Results(Mapping[str, np.ndarray]):
         >>> axes.get_title(loc="left")
         'base, t = 0.4 h: acceptor (mg/L)'
         """
-        if Path(file).suffix != ".gif":
-            raise ValueError(f"file: {file}: a file name that ends in .gif is needed")
+        if Path(file).suffix not in (".gif", ".mp4"):
+            raise ValueError(f"file: {file}: a file name that ends in .gif or .mp4 is needed")
         fields = self._fields[-1] if len(self.time) else {}
-        return drawing.film(self, self._field(name, fields), Path(file), ax)
+        style = Style(log, unit, title, cmap)
+        return drawing.film(self, self._field(name, fields), Path(file), ax, style)
 
     def to_pandas(self):
         """Return the columns as a ``pandas.DataFrame``.
@@ -393,6 +516,24 @@ def _hours(time: float | str) -> float:
     except (ValueError, OverflowError):
         raise ValueError(f'time: {time!r}: a number of hours or a text such as "90 min" is '
                          "needed") from None
+
+
+def _evenly(times: np.ndarray) -> np.ndarray:
+    """Return the times nearest to MOST_OUTLINES equal intervals."""
+    wanted = np.linspace(times[0], times[-1], MOST_OUTLINES) if len(times) else times
+    return times[np.unique(np.abs(times - wanted[:, None]).argmin(axis=1))] if len(times) else times
+
+
+def _photograph(image: Any, um_per_pixel: float | None,
+                corner: Sequence | None) -> Photograph | None:
+    """Return the image under outlines. Raises ValueError if it lacks its scale."""
+    if image is None and um_per_pixel is None and corner is None:
+        return None
+    if image is None or not (um_per_pixel and um_per_pixel > 0):
+        raise ValueError("um_per_pixel: a number greater than zero is needed with an image")
+    if corner is not None and len(corner) != 2:
+        raise ValueError(f"corner: a place (x, y) in um is needed, not {corner!r}")
+    return Photograph(image, um_per_pixel, corner)
 
 
 def _html_row(head: str, values: np.ndarray) -> str:

@@ -39,8 +39,10 @@ from repro.scene.units import (
     UP_TO_1,
     UP_TO_20,
     WORD,
+    Drawn,
     Flag,
     Points,
+    Refused,
     SceneError,
     Stated,
     Times,
@@ -725,12 +727,30 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
                        units=units_of(tables))
     if scheme is not None and scheme != scene.numerics.scheme:
         scene = replace(scene, numerics=replace(scene.numerics, exchanged=scheme))
+    scene = _with_files(scene, file)
     for broken, requirement in rules(scene):
         if broken:
             key = _to_name(list(requirement), tables, changed)
             value = _at(tables, key, _at(scene_tables(scene), key, MISSING))
             raise Place(file, key).refuse(value, requirement[key])
     return scene
+
+
+def _with_files(scene: Scene, file: str) -> Scene:
+    """Read the outlines that are files. Raises SceneError, naming the scene's ``file``."""
+    seeds = []
+    for place, seed in zip(scene.places, scene.aggregates):
+        if isinstance(seed.outline, Drawn):
+            from repro.scene.drawn import points_of  # a scene without files does not load it
+
+            try:
+                points = points_of(seed.outline, seed.wall, scene.pore.width)
+            except Refused as error:
+                key = Place(file, f"{place}.outline")
+                raise key.refuse(asdict(seed.outline), str(error)) from None
+            seed = replace(seed, outline=points)
+        seeds.append(seed)
+    return replace(scene, aggregates=tuple(seeds))
 
 
 def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:

@@ -352,20 +352,43 @@ class Times:
 
 
 @dataclass(frozen=True)
+class Drawn:
+    """A file with an outline, and um per unit of its coordinates or per pixel."""
+
+    file: str
+    um_per_unit: float
+
+
+@dataclass(frozen=True)
 class Points:
-    """A list of points (x, y), um, in their order."""
+    """A list of points (x, y), um, in their order, or a file with a polygon."""
 
     each = Quantity("um", "4 um", EITHER_SIGN)
     default: ClassVar[dict] = {"default": None}
     example = [["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]]
-    accepted = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
-    requirement = f"{accepted}, is needed, such as {json.dumps(example)}"
+    file = '{ file = "colony.geojson", um_per_unit = 1.0 }'
+    listed = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
+    accepted = (f"{listed}; or a file .geojson, .csv or .png with a polygon or a mask, such as "
+                f"{file}")
+    requirement = f"{listed}, is needed, such as {json.dumps(example)}, or a file, such as {file}"
+    scale = Number(1.0)
 
-    def read(self, value: object) -> tuple[tuple[float, float], ...]:
+    def read(self, value: object) -> tuple[tuple[float, float], ...] | Drawn:
+        if isinstance(value, dict):
+            return self._drawn(value)
         points = as_list(value)
         if points is None or not 3 <= len(points) <= MOST_POINTS:
             raise ValueError(_wrong_type(value))
         return tuple(_each("point", self._point, points))
+
+    def _drawn(self, value: dict) -> Drawn:
+        if value.keys() != {"file", "um_per_unit"} or not isinstance(value["file"], str):
+            raise ValueError("a file has the keys file and um_per_unit")
+        try:
+            return Drawn(value["file"], self.scale.read(value["um_per_unit"]))
+        except ValueError as error:
+            raise Refused("um_per_unit, the length of a unit or pixel in um, is a plain number "
+                          f"greater than zero{because(error)}") from None
 
     def _point(self, value: object) -> tuple[float, float]:
         pair = as_list(value)
