@@ -125,7 +125,7 @@ def test_the_command_draws_a_film(results, tmp_path):
 @pytest.mark.parametrize("arguments, message", [
     (["doner", "--out", "x.png"], "did you mean donor"), (["--out", "x.gif"], "a film needs QUANTITY and accepts no"),
     (["donor", "--time", "1", "--out", "x.gif"], "no --time"),
-    (["donor", "--time", "0.21 h", "--out", "x.png"], "0.21 h: not a reported time; the nearest rows are at 0.2 "),
+    (["donor", "--time", "0.61 h", "--out", "x.png"], "0.61 h: outside the run, from 0 to 0.6 h"),
     (["donor", "--time", "12 um", "--out", "x.png"], "time: '12 um': a number of hours or a text such as"),
     (["--out", "x.txt"], "is not supported")])
 def test_the_command_refuses_in_one_line(results, tmp_path, capsys, monkeypatch, arguments, message):

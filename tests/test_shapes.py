@@ -10,7 +10,7 @@ from PIL import Image
 
 import repro
 from repro.cli import main
-from repro.results import drawing
+from repro.results import COLUMNS, drawing
 from tests import faults
 
 SHORT = {"numerics.preset": "fast", "growth.end": "0.4 h", "output.every": "0.2 h"}
@@ -123,7 +123,7 @@ def test_a_quantity_is_shown_in_a_unit_and_on_a_scale_of_choice(results):
     ([1, 99.9], "linear"), ([1, 100], "log"), ([0, 100], "linear"), ([-1, 100], "linear"),
     ([np.nan, np.nan], "linear")])
 def test_an_axis_is_logarithmic_from_two_decades_on(values, scale):
-    rows = [dict.fromkeys(repro.results.COLUMNS) | {"time_h": float(k), "head_loss_cm": value, "nodes": 1}
+    rows = [dict.fromkeys(COLUMNS) | {"time_h": float(k), "head_loss_cm": value, "nodes": 1}
             for k, value in enumerate(values)]
     ax = repro.Results("x", rows, [], "completed").plot("head_loss")
     assert ax.get_yscale() == scale

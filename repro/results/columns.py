@@ -131,6 +131,11 @@ def _uptake(substrate: int, k: int, scene: Scene, at: Report) -> float:
     return float(uptakes(at.solved.problem, at.pore, at.solved.concentrations)[k, substrate])
 
 
+def _growth(scene: Scene, at: Report) -> float:
+    from repro.model.substrates import net_growth
+    return net_growth(at.solved.problem, at.pore, at.solved.concentrations, scene.kinetics)
+
+
 def _film(k: int, scene: Scene, at: Report) -> float:
     spans = at.pore.bodies[k].spans
     return 0.0 if spans else at.pore.outlines[k].gap(at.pore.mesh.walls)
@@ -252,6 +257,17 @@ SERIES = (
              lambda scene, at: int(at.pore.contact), yes_no=True),
 )
 
+#: Columns of a scene with kinetics, after ``SERIES``: runs of earlier versions do not have them.
+RATES = (
+    *(Quantity(f"{name}_uptake_ug_per_m_per_h", f"uptake of the {name}",
+               "integral of (7)-(8) over the aggregates, at the present concentrations",
+               _all(partial(_uptake, k), sum), f"{name} uptake", f"{name} and biomass", signed=True)
+      for k, name in enumerate(SUBSTRATES)),
+    Quantity("biomass_growth_ug_per_m_per_h", "net growth of the biomass",
+             "integral of (9) + (10) over the aggregates, at the present concentrations",
+             _growth, "net growth", "biomass", signed=True),
+)
+
 #: Columns of each aggregate of a scene with several: value takes its place in the pore's list, the
 #: scene and a Report. NAME is its name, or its number from one. They are empty once it has left.
 BODY = (
@@ -308,10 +324,11 @@ def _of_named(value: Callable, name: str, scene: Scene, at: Report) -> float | N
 
 
 def series(scene: Scene) -> tuple[Quantity, ...]:
-    """The quantities of ``timeseries.csv`` of a scene: ``SERIES``, and ``BODY`` for each of several
-    aggregates."""
+    """The quantities of ``timeseries.csv`` of a scene: ``SERIES``, ``RATES`` with kinetics, and
+    ``BODY`` for each of several aggregates."""
     labels = scene.labels if len(scene.aggregates) > 1 else []
-    return *SERIES, *(of_body(quantity, label) for label in labels for quantity in BODY)
+    rates = RATES if scene.kinetics else ()
+    return *SERIES, *rates, *(of_body(quantity, label) for label in labels for quantity in BODY)
 
 
 def column_names(scene: Scene) -> list[str]:

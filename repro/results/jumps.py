@@ -21,6 +21,9 @@ STRESSES = ("wall_traction_max_MPa", "tensile_stress_max_MPa")
 CARRIED = tuple(f"{pattern}_mg_per_L" for name in ("acceptor", "donor")
                 for pattern in (f"effluent_{name}", f"inlet_{name}", f"{name}_min",
                                 f"{name}_overshoot"))
+#: Rates that jump with them.
+RATES = ("acceptor_uptake_ug_per_m_per_h", "donor_uptake_ug_per_m_per_h",
+         "biomass_growth_ug_per_m_per_h")
 
 
 def with_jumps(name: str, times: np.ndarray, values: np.ndarray,
@@ -48,6 +51,6 @@ def _jumps(name: str, tables: Mapping[str, dict]) -> list[float]:
     supplies = [jump_times(part) for part in tables.get("substrates", {}).values()
                 if isinstance(part, dict)]
     times = sorted({*flow, *(time for times in supplies for time in times)})
-    if name not in CARRIED or not times:
+    if name not in (*CARRIED, *RATES) or not times:
         return []
     return [] if transport_in_time(tables["numerics"]["transport"]).stores else times

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from html import escape
 from importlib import import_module
 from pathlib import Path
@@ -13,15 +14,15 @@ import numpy as np
 
 from repro import results
 from repro.errors import RunEnd
-from repro.march.simulation import simulate
-from repro.march.state import SAME_TIME
-from repro.results import drawing, names, netcdf, outlines, picture
+from repro.march.simulation import report_at, reports, steps
+from repro.march.state import SAME_TIME, Report, RestartState
+from repro.results import drawing, names, netcdf, outlines, picture, sampling
 from repro.results.drawing import Photograph, Style
 from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
 from repro.results.outlines import Outline
 from repro.results.quantities import plain as unit
-from repro.scene import Source, bodies, load_scene, scene_tables
+from repro.scene import Scene, Source, bodies, load_scene, scene_tables
 from repro.scene.arguments import Overrides, typed
 from repro.scene.units import to_internal
 from repro.schemes import Scheme
@@ -54,6 +55,8 @@ class Results(Mapping[str, np.ndarray]):
         Tables of the scene, with units; curves jump where its tables over time do.
     provenance : mapping, optional
         ``hash`` of the scene and ``versions`` of the packages, for :meth:`to_netcdf`.
+    rerun : callable, optional
+        Computes the fields at a time (h) between rows.
 
     Notes
     -----
@@ -70,7 +73,8 @@ class Results(Mapping[str, np.ndarray]):
     def __init__(self, name: str, rows: list[dict[str, float | None]],
                  fields: Sequence[Mapping[str, np.ndarray]], status: str,
                  folder: Path | None = None, tables: Mapping[str, dict] | None = None,
-                 provenance: Mapping[str, Any] | None = None):
+                 provenance: Mapping[str, Any] | None = None,
+                 rerun: Callable[[float], dict[str, np.ndarray]] | None = None):
         self.columns: dict[str, np.ndarray] = {}
         for key in dict.fromkeys([*results.COLUMNS, *(rows[0] if rows else ())]):
             values = [row[key] for row in rows]
@@ -83,6 +87,7 @@ class Results(Mapping[str, np.ndarray]):
         self.tables = tables or {}
         self.provenance = provenance or {}
         self._fields = fields
+        self._rerun = lru_cache(maxsize=8)(rerun) if rerun else None
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.columns:
@@ -114,14 +119,19 @@ class Results(Mapping[str, np.ndarray]):
 
     @typed
     def fields(self, time: float | str, method: str | None = None) -> Mapping[str, np.ndarray]:
-        """Return the fields at a reported time.
+        """Return the fields at a time within the run.
+
+        Those between rows are computed again from the nearest earlier state: that of a row of a run
+        in memory, or the last saved state of a run in a folder, which has none before its end. They
+        equal those of a row at this time to the last bit, unless versions have changed since, which
+        issues a warning. The folder stays as it is.
 
         Parameters
         ----------
         time : float or str
             Hours, or a text with a unit such as "90 min".
         method : str, optional
-            "nearest" takes the nearest row; by default, the time must be that of a row.
+            "nearest" takes the nearest row, without a computation.
 
         Returns
         -------
@@ -133,9 +143,14 @@ class Results(Mapping[str, np.ndarray]):
         Raises
         ------
         KeyError
-            If the time is not a reported one: names the rows beside it.
+            If the time is outside the run: names its times.
         ValueError
             If the method is another one, or a text is not a time.
+
+        Notes
+        -----
+        A time costs at most a step of a run in memory beyond the row before it. For a run in a
+        folder it costs as much as the run to this time. The last eight times are kept.
 
         Examples
         --------
@@ -144,17 +159,32 @@ class Results(Mapping[str, np.ndarray]):
         >>> fields["places_um"].shape[1], fields["triangles"].shape[1]
         (2, 3)
         """
-        return self._fields[self._row(time, method)]
+        hours = _hours(time)
+        row = self._row(hours, method)
+        if row is not None:
+            return self._fields[row]
+        if self._rerun and len(self.time):
+            end = self._end
+            if 0 <= hours <= end:
+                return self._rerun(hours)
+            raise KeyError(f"{hours} h: outside the run, from 0 to {end:g} h")
+        raise KeyError(f"{hours} h: not a reported time; {self._rows_beside(hours)}")
 
-    def _row(self, time: float | str, method: str | None = None) -> int:
-        """Find the row at, or nearest to, a time."""
-        time = _hours(time)
+    @property
+    def _end(self) -> float:
+        """Time (h) that the run has reached; a run that ends otherwise has a row then."""
+        growth = self.tables.get("growth", {})
+        completed = self.status == "completed" and "end" in growth
+        return to_internal(growth["end"], "h") if completed else float(self.time[-1])
+
+    def _row(self, time: float, method: str | None = None) -> int | None:
+        """Find the row at, or nearest to, a time (h)."""
         if method not in (None, "nearest"):
             raise ValueError(f'method: None or "nearest" is needed, not {method!r}')
         distance = np.abs(self.time - time)
         if len(distance) and (distance.min() <= SAME_TIME or method and np.isfinite(time)):
             return int(distance.argmin())
-        raise KeyError(f"{time} h: not a reported time; {self._rows_beside(time)}")
+        return None
 
     def _rows_beside(self, time: float) -> str:
         """Say which rows exist: all times, or the nearest ones before and after a time (h)."""
@@ -166,6 +196,110 @@ class Results(Mapping[str, np.ndarray]):
         near = " and ".join(f"{neighbour:.6g}" for neighbour in beside)
         return (f"the nearest rows are at {near} h, of {count} from {self.time[0]:.6g} to "
                 f"{self.time[-1]:.6g} h")
+
+    @typed
+    def probe(self, name: str, x: float | str, y: float | str) -> np.ndarray:
+        """Return a field at a place at all reported times.
+
+        Parameters
+        ----------
+        name : str
+            A field, with its unit or without.
+        x, y : float or str
+            Coordinates, um, or texts with a unit: x from the middle of the pore, y from its lower
+            wall.
+
+        Returns
+        -------
+        (rows,) or (rows, 3) array
+            Values in the unit of the field's name. NaN where the field has none, as of the
+            aggregate in the fluid, and where the place is beside the meshed part.
+
+        Raises
+        ------
+        KeyError
+            If the run has no field of this name.
+        ValueError
+            If the place is outside the pore.
+
+        Examples
+        --------
+        >>> import repro
+        >>> results = repro.solve("base", {"growth.end": "0.4 h"})
+        >>> results.probe("acceptor", x=0, y="20 um").round(1).tolist()
+        [9.9, 9.9, 9.9]
+        """
+        place = np.array([[self._coordinate("x", x), self._coordinate("y", y)]])
+        values = [sampling.sample(fields, self._field(name, fields), place)[0]
+                  for fields in map(self.fields, self.time)]
+        return np.array(values)
+
+    @typed
+    def profile(self, name: str, *, time: float | str, x: float | str | None = None,
+                y: float | str | None = None, points: int = 201) -> tuple[np.ndarray, np.ndarray]:
+        """Return a field along a line across the pore, or along it, at a time.
+
+        Parameters
+        ----------
+        name : str
+            A field, with its unit or without.
+        time : float or str
+            Hours, or a text with a unit, as for :meth:`fields`.
+        x, y : float or str, optional
+            One of them, um or a text with a unit: the place of a line from wall to wall, or the
+            height of one over the meshed part.
+        points : int, optional
+            Number of points.
+
+        Returns
+        -------
+        coordinate : (points,) array
+            The other coordinate, um.
+        values : (points,) or (points, 3) array
+            Values in the unit of the field's name; NaN where the field has none.
+
+        Raises
+        ------
+        KeyError
+            If the run has no field of this name, or no state at this time.
+        ValueError
+            If not one of x and y is given, or if it is outside the pore.
+
+        Examples
+        --------
+        >>> import repro
+        >>> results = repro.solve("base", {"growth.end": "0.4 h"})
+        >>> x, acceptor = results.profile("acceptor", y="20 um", time=0.4)
+        >>> len(x), bool(acceptor[0] > acceptor[-1])
+        (201, True)
+        """
+        if (x is None) == (y is None) or points < 2:
+            raise ValueError("profile: one of x and y, and two points or more, are needed")
+        fields = self.fields(time)
+        (left, low), (right, high) = drawing.corners(fields)
+        if x is not None:
+            along = np.linspace(low, high, points)
+            places = np.column_stack([np.full(points, self._coordinate("x", x)), along])
+        else:
+            along = np.linspace(left, right, points)
+            places = np.column_stack([along, np.full(points, self._coordinate("y", y))])
+        return along, sampling.sample(fields, self._field(name, fields), places)
+
+    def _coordinate(self, axis: str, value: float | str) -> float:
+        """Return a coordinate, um. Raises ValueError if it is outside the pore."""
+        try:
+            place = to_internal(value, "um") if isinstance(value, str) else value
+        except (ValueError, OverflowError):
+            raise ValueError(f'{axis}: {value!r}: a number of um or a text such as "20 um" is '
+                             "needed") from None
+        pore = self.tables.get("pore", {})
+        length, width = (to_internal(pore[key], "um") if key in pore else np.inf
+                         for key in ("length", "width"))
+        low, high = (-length / 2, length / 2) if axis == "x" else (0.0, width)
+        if not low <= place <= high:
+            raise ValueError(f"{axis}: {place:g} um is outside the pore, from {low:g} to {high:g} "
+                             "um")
+        return place
 
     @typed
     def outline(self, time: float | str, body: str | int | None = None) -> Outline:
@@ -422,31 +556,65 @@ class Results(Mapping[str, np.ndarray]):
                            units={name: unit(name) for name in self.columns})
         return frame
 
-    def to_xarray(self):
-        """Return the columns as an ``xarray.Dataset``.
+    @typed
+    def to_xarray(self, fields: Sequence[str] = (), *, across: int = 51):
+        """Return the columns, and fields on a regular grid, as an ``xarray.Dataset``.
+
+        Parameters
+        ----------
+        fields : sequence of str, optional
+            Fields, with their units or without.
+        across : int, optional
+            Number of points over the width of the pore; the grid is equally fine along it.
 
         Returns
         -------
         xarray.Dataset
-            Variables over ``time_h``, each with its ``units`` and its ``long_name``.
+            Variables over ``time_h``, and fields over ``time_h``, ``y_um`` and ``x_um``, vectors
+            over ``axis``, too. Each has its ``units`` and its ``long_name``. Fields are NaN where
+            they have no value, and beside the meshed part of a time.
 
         Raises
         ------
         ImportError
             If xarray is not installed.
+        KeyError
+            If the run has no field of a name.
 
         Examples
         --------
         >>> import repro
         >>> repro.solve("flow_only").to_xarray()["head_loss_cm"].attrs["units"]
         'cm'
+        >>> repro.solve("flow_only").to_xarray(["velocity"])["velocity_m_per_d"].dims
+        ('time_h', 'y_um', 'x_um', 'axis')
         """
         attributes = {name: {"units": names.udunits(name), "long_name": names.words(name)}
                 for name in self.columns}
         columns = {name: (TIME, values, attributes[name]) for name, values in self.columns.items()}
         times = {TIME: columns.pop(TIME)}
         about = {"scene": self.name, "status": self.status}
-        return package("xarray").Dataset(columns, times, about)
+        dataset = package("xarray").Dataset(columns, times, about)
+        return dataset.assign(self._gridded(fields, across)) if len(fields) else dataset
+
+    def _gridded(self, fields: Sequence[str], across: int) -> dict[str, Any]:
+        """Fields of all rows on a regular grid, by name, as ``xarray.DataArray``s."""
+        rows = [self.fields(time) for time in self.time]
+        full_names = [self._field(name, rows[0] if rows else {}) for name in fields]
+        boxes = np.array([drawing.corners(each) for each in rows])
+        box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        x, y = sampling.grid(box, across)
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        coordinates = {TIME: self.time, "y_um": y, "x_um": x, "axis": ["x", "y", "z"]}
+        gridded = {}
+        for name in full_names:
+            values = np.array([sampling.sample(each, name, places) for each in rows])
+            values = values.reshape(len(rows), len(y), len(x), *values.shape[2:])
+            dims = list(coordinates)[:values.ndim]
+            gridded[name] = package("xarray").DataArray(
+                values, {dim: coordinates[dim] for dim in dims}, dims,
+                attrs={"units": names.udunits(name), "long_name": names.words(name)})
+        return gridded
 
     @typed
     def to_netcdf(self, file: str | Path) -> None:
@@ -592,17 +760,35 @@ def solve(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = ()
     duration = scene.growth.end if scene.growth else 0.0
     rows = []
     fields = []
+    states = []
     status = "completed"
+
+    def reported() -> Iterator[tuple[RestartState, Report | None]]:
+        for state, report in steps(scene):
+            if report:
+                states.append(state)
+            yield state, report
+
+    def rerun(time: float) -> dict[str, np.ndarray]:
+        earlier = [state for state in states if state.time <= time]
+        return fields_at(scene, earlier[-1] if earlier else None, time)
+
     with progress_bar(progress, "h") as show:
         try:
-            for instant in simulate(scene):
+            for instant in reports(reported()):
                 rows.append(results.row(scene, instant))
                 fields.append(arrays(results.fields(scene, instant.pore, instant.solved)))
                 show(instant.pore.time, duration)
         except RunEnd as end:
             status = str(end)
     return Results(scene.name, rows, fields, status, tables=scene_tables(scene),
-                   provenance=results.provenance(scene))
+                   provenance=results.provenance(scene), rerun=rerun)
+
+
+def fields_at(scene: Scene, state: RestartState | None, time: float) -> dict[str, np.ndarray]:
+    """Return the fields of a row at a time (h), computed from an earlier state of the run."""
+    report = report_at(scene, state, time)
+    return arrays(results.fields(scene, report.pore, report.solved))
 
 
 def arrays(content: Grid) -> dict[str, np.ndarray]:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from repro.errors import OutputError
+from repro.errors import CheckpointError, OutputError
+from repro.march.state import RestartState
 from repro.report import fields, reading
-from repro.results import field_files
+from repro.results import field_files, provenance
 from repro.results.files import sha256_of
-from repro.results.tables import Results, arrays
-from repro.runs import execution
+from repro.results.tables import Results, arrays, fields_at
+from repro.runs import checkpoint, execution
 from repro.runs.execution import Watch, issue_warnings, origin_of
-from repro.runs.folder import read_sums
-from repro.scene import Source, load_scene
+from repro.runs.folder import PROVENANCE, read_sums
+from repro.runs.machine import conditions
+from repro.runs.state_arrays import unpack_state
+from repro.scene import Scene, Source, load_scene, parse_scene
 from repro.scene.arguments import Overrides, typed
 from repro.timing import progress_bar
 
@@ -181,7 +186,27 @@ def load_run(folder: str | Path) -> Results:
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed_fields)
     return Results(run.record["scene"], rows, files, run.record["status"], Path(folder),
-                   run.record["tables"], run.record)
+                   run.record["tables"], run.record, partial(_rerun, run))
+
+
+def _rerun(run: reading.Run, time: float) -> dict[str, np.ndarray]:
+    """Compute the fields at a time (h) from the last saved state before it, or from t = 0."""
+    record = run.record
+    scene = parse_scene(record["tables"], record["scene"], str(run.folder / PROVENANCE))
+    current = provenance(scene)["versions"], conditions()["source"]
+    if (record["versions"], record["conditions"]["source"]) != current:
+        warnings.warn(f"{run.folder}: code or packages have changed since the run: the fields at "
+                      f"{time:g} h may differ from those of its rows", stacklevel=4)
+    states = [state for name in (checkpoint.LAST, *checkpoint.STATES)
+              for state in _saved_states(scene, run.folder / name) if state.time <= time]
+    return fields_at(scene, max(states, key=lambda state: state.time, default=None), time)
+
+
+def _saved_states(scene: Scene, path: Path) -> Iterator[RestartState]:
+    """The state in a file, unless it is absent, damaged or of another version or scene."""
+    with suppress(CheckpointError):
+        plain, saved = checkpoint.read_checkpoint(path)
+        yield unpack_state(scene, plain["state"], saved)
 
 
 def _none_if_nan(value: float) -> float | None:

@@ -451,7 +451,7 @@ class Output:
         about="Times of the requested rows and fields; they change no step. Without it: every "
         "step, with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are "
         "24 rows or more after t = 0")
-    every: float | None = quantity(
+    every: float = quantity(
         "1 h", "h", default=None, source=NOT_IN_PAPER,
         about="Interval of rows and fields from t = 0 on, with a last one at growth.end; times "
         "adds others")
@@ -593,6 +593,10 @@ class Scene:
     def requested_times(self) -> tuple[float, ...] | None:
         """The times (h) of rows by [output], ascending; None: every step."""
         return self.output.requested(self.growth.end if self.growth else 0.0)
+
+    def reporting(self, time: float) -> "Scene":
+        """Return the scene with a row at a time (h) alone."""
+        return replace(self, output=replace(self.output, every=None, times=(time,)))
 
     def corner(self, time: float) -> float:
         """Return the next time (h) of its tables after ``time``; infinite if there is none."""
