@@ -58,7 +58,7 @@ def test_a_run_starts_again_from_its_saved_state(tmp_path, monkeypatch):
     results.fields(4.98)
     assert starts[2] is None
     solved("fast").fields(0.45)
-    assert 0.25 < starts[3] <= 0.45
+    assert starts[3] and 0.25 < starts[3] <= 0.45
 
 
 def test_a_run_of_other_versions_warns(tmp_path, monkeypatch):

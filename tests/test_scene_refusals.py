@@ -27,7 +27,7 @@ MOLES = "; moles need a molar mass, which is not known here: give milligrams"
 #: {part of the message: entries of --set}.
 REFUSED = {
     # unknown keys and sections
-    'pore.widht = "50 um": there is no such key; [pore] takes width, length, upper_wall (did you mean': [
+    'pore.widht = "50 um": there is no such key; [pore] takes width, length, upper_wall, depth (did you mean': [
         'pore.widht="50 um"'],
     "[substrates] takes acceptor, donor, boundary": ["substrates.oxygen.supply=1 mg/L"],
     "(did you mean supply?)": ["substrates.donor.suply=1 mg/L"],
@@ -90,7 +90,6 @@ REFUSED = {
     # what is not modelled
     "[growth] takes end,": ["growth.detachment=1 1/day"],
     f'; "detachment" {SCOPED}': ["growth.detachment=1 1/day", "detachment_rate=1 1/day"],
-    f'; "depth" {SCOPED}': ["pore.depth=50 um"],
     "did you mean substrates.donor.inhibition_constant?": ["kinetics.inhibition_constant=5 mg/L"],
     f'; "temperature" {SCOPED}': ["kinetics.Temperature=20"],
     "aggregate.1 and aggregate.2 overlap or touch": ["aggregate=[{radius=\"5 um\"}, {}]"],
@@ -172,7 +171,7 @@ def test_every_key_refuses_values_of_another_kind():
 @pytest.mark.parametrize("source, overrides, part", [
     ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
     ("wide", ['flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "0 m/day"]]'], "greater than zero is needed"),
-    ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
+    ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it, flow.mean_velocity or flow.rate is needed"),
     ("base", ["flow.permeability=1e-15 m^2", "flow.viscosity_ratio=5"],
      "flow.viscosity_ratio (5.0) is set too; only one of them is accepted"),
     ("base", ["flow.biomass=brinkman"], "this key was removed; leave it out: an aggregate is permeable with flow.perm"),

@@ -268,6 +268,29 @@ RATES = (
              _growth, "net growth", "biomass", signed=True),
 )
 
+def _total(name: str, of: Quantity) -> Quantity:
+    """The total of a quantity per depth, by the depth of the pore."""
+    words = of.words.replace("area", "volume")
+    return replace(of, name=name, words=f"{words}, over the depth",
+                   formula=f"{of.name} times pore.depth",
+                   value=lambda scene, at: scene.pore.depth * of.value(scene, at))
+
+
+_PER_DEPTH = {quantity.name: quantity for quantity in (*SERIES, *RATES)}
+#: Columns of a scene with a depth.
+TOTALS = (
+    Quantity("flow_rate_uL_per_min", "flow rate",
+             "u_ave W pore.depth, of the whole pore: with 2 W up to a plane of symmetry",
+             lambda scene, at: (scene.pore.depth * scene.pore.whole_width
+                                * _PER_DEPTH["mean_velocity_m_per_d"].value(scene, at)),
+             "flow rate", "flow"),
+    _total("aggregate_volume_um3", _PER_DEPTH["aggregate_area_um2"]),
+    *(_total(f"{name}_pg_per_h", _PER_DEPTH[f"{name}_ug_per_m_per_h"])
+      for name in (*(f"{substrate}_uptake" for substrate in SUBSTRATES), "biomass_growth")),
+    *(_total(f"fluid_force_{axis}_nN", _PER_DEPTH[f"fluid_force_{axis}_uN_per_m"])
+      for axis in "xy"),
+)
+
 #: Columns of each aggregate of a scene with several: value takes its place in the pore's list, the
 #: scene and a Report. NAME is its name, or its number from one. They are empty once it has left.
 BODY = (
@@ -324,11 +347,13 @@ def _of_named(value: Callable, name: str, scene: Scene, at: Report) -> float | N
 
 
 def series(scene: Scene) -> tuple[Quantity, ...]:
-    """The quantities of ``timeseries.csv`` of a scene: ``SERIES``, ``RATES`` with kinetics, and
-    ``BODY`` for each of several aggregates."""
+    """The quantities of ``timeseries.csv`` of a scene: ``SERIES``, ``RATES`` with kinetics,
+    ``TOTALS`` with a depth, and ``BODY`` for each of several aggregates."""
     labels = scene.labels if len(scene.aggregates) > 1 else []
     rates = RATES if scene.kinetics else ()
-    return *SERIES, *rates, *(of_body(quantity, label) for label in labels for quantity in BODY)
+    totals = TOTALS if scene.pore.depth else ()
+    bodies = (of_body(quantity, label) for label in labels for quantity in BODY)
+    return *SERIES, *rates, *totals, *bodies
 
 
 def column_names(scene: Scene) -> list[str]:

@@ -69,7 +69,10 @@ RATIO = 1.52  # F, mg/mg, Table 1
 
 @dataclass(frozen=True)
 class Pore:
-    """The channel `0 <= y <= width` (um), or the half of one below a plane of symmetry."""
+    """The channel `0 <= y <= width` (um), or the half of one below a plane of symmetry.
+
+    `depth` (um) is that of the whole pore, across the plane; the model is plane.
+    """
 
     width: float = quantity("100 um", "um", PORE_WIDTH, about="W_pore, from wall to wall",
                             source="Table 1 (typically 100 um; 50 um in section 4)")
@@ -78,6 +81,15 @@ class Pore:
         "no slip", "symmetry", source=NOT_IN_PAPER,
         about="The upper wall: like the lower one, or the middle of a pore of twice the width, "
               "with the mirror image of the aggregate beyond it")
+    depth: float | None = quantity(
+        "10 um", "um", default=None, source=NOT_IN_PAPER,
+        about="Depth across the plane, for flow.rate and for columns of totals; results per depth "
+              "do not need it")
+
+    @property
+    def whole_width(self) -> float:
+        """Width (um), with its mirror image beyond a plane of symmetry."""
+        return self.width * (2.0 if self.upper_wall == "symmetry" else 1.0)
 
 
 @dataclass(frozen=True)
@@ -132,17 +144,21 @@ class Aggregate:
 class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
-    The other one is None. A table of the scene is a TimeTable here, and a number in the scene that
-    `Scene.at` returns. The aggregate has a `viscosity_ratio` or a `permeability` (um^2); the other
-    one is None.
+    The other one is None; a `rate` (um^3/h) gives the mean velocity. A table of the scene is a
+    TimeTable here, and a number in the scene that `Scene.at` returns. The aggregate has a
+    `viscosity_ratio` or a `permeability` (um^2); the other one is None.
     """
 
     head: float | None = timed_quantity(
         "1e-3 cm", "um", default=None, source="(6), section 4",
-        about="Head lost over the whole pore; either this or mean_velocity")
+        about="Head lost over the whole pore; either this, mean_velocity or rate")
     mean_velocity: float | None = timed_quantity(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
-        about="u_ave, mean over the width; either this or head")
+        about="u_ave, mean over the width; either this, head or rate")
+    rate: float | None = timed_quantity(
+        "0.1 uL/min", "um^3/h", NON_NEGATIVE, default=None, source=NOT_IN_PAPER,
+        about="Flow through the whole pore, of width and pore.depth, with the mirror image beyond "
+              "a plane of symmetry; either this, head or mean_velocity")
     viscosity_ratio: float | None = number(
         LAMBDA, source="2.1, Table 1", stated="default 2000 without permeability",
         default=None, about="lambda, viscosity of the aggregate over that of water")
@@ -572,7 +588,7 @@ class Scene:
         """Whether there are substrates without flow, at any time."""
         if self.substrates is None or self.flow is None:
             return self.substrates is not None
-        velocity = self.flow.mean_velocity
+        velocity = self.flow.mean_velocity if self.flow.rate is None else self.flow.rate
         return 0 in velocity.values if isinstance(velocity, TimeTable) else velocity == 0
 
     @cached_property
@@ -737,7 +753,25 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
             key = _to_name(list(requirement), tables, changed)
             value = _at(tables, key, _at(scene_tables(scene), key, MISSING))
             raise Place(file, key).refuse(value, requirement[key])
-    return scene
+    return _with_velocity(scene)
+
+
+def _with_velocity(scene: Scene) -> Scene:
+    """Return the scene with the mean velocity (um/h) of its flow rate."""
+    if scene.flow is None or scene.flow.rate is None:
+        return scene
+    area = scene.pore.whole_width * scene.pore.depth
+    rate = scene.flow.rate
+    velocity = rate / area if not isinstance(rate, TimeTable) else replace(
+        rate, values=tuple(value / area for value in rate.values))
+    return replace(scene, flow=replace(scene.flow, mean_velocity=velocity))
+
+
+def _as_given(scene: Scene) -> Scene:
+    """Return the scene without the mean velocity of its flow rate."""
+    if scene.flow is None or scene.flow.rate is None:
+        return scene
+    return replace(scene, flow=replace(scene.flow, mean_velocity=None))
 
 
 def _with_files(scene: Scene, file: str) -> Scene:
@@ -799,7 +833,7 @@ def scene_tables(scene: Scene) -> dict:
 
     `parse_scene` reads them back as an equal scene, bit by bit.
     """
-    return write_table(scene, scene.units)
+    return write_table(_as_given(scene), scene.units)
 
 
 def scene_hash(scene: Scene) -> str:
@@ -808,7 +842,7 @@ def scene_hash(scene: Scene) -> str:
     A key of `LATER` counts if it differs from its default, and a scene counts as earlier versions
     wrote it, so that recorded hashes stay valid. A scheme counts if it is not that of the preset.
     """
-    written = with_former(write_table(scene))
+    written = with_former(write_table(_as_given(scene)))
     tables = {key: _without_later(key, table) for key, table in written.items()}
     if scene.numerics.exchanged is not None:
         tables["scheme"] = asdict(scene.numerics.exchanged)

@@ -33,7 +33,7 @@ NOT_MODELLED = {
                    "substrates acceptors donors nitrate nitrite ammonium sulfate"),
     "kinetics": ("one species of bacteria is modelled", "strain strains species"),
     "": ('"{word}" is not modelled',
-         "attachment detachment erosion sloughing depth dimension dimensions temperature inertia "
+         "attachment detachment erosion sloughing dimension dimensions temperature inertia "
          "turbulence precipitation maintenance quorum ph gas"),
 }
 

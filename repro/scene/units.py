@@ -32,6 +32,7 @@ NOUNS = {
     "h": "a time",
     "um^2": "a permeability",
     "um/h": "a velocity",
+    "um^3/h": "a flow rate",
     "um/h^2": "an acceleration",
     "um^2/h": "a diffusivity or kinematic viscosity",
     "1/h": "a rate",
