@@ -30,6 +30,7 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "seed": lambda scene, at: bool(scene.aggregates or at.pore.bodies),
     "aggregate": lambda scene, at: bool(at.pore.bodies),
     "biomass": lambda scene, at: bool(at.pore.bodies) and scene.kinetics is not None,
+    "substrates": lambda scene, at: at.solved.concentrations is not None,
     "growth": lambda scene, at: NEEDS["seed"](scene, at) and scene.growth is not None,
     "adhesion": lambda scene, at: (scene.growth is not None and bool(at.pore.bodies)
                                    and at.pore.accumulates and _has_adhesion(scene.growth))}
@@ -265,7 +266,7 @@ RATES = (
       for k, name in enumerate(SUBSTRATES)),
     Quantity("biomass_growth_ug_per_m_per_h", "net growth of the biomass",
              "integral of (9) + (10) over the aggregates, at the present concentrations",
-             _growth, "net growth", "biomass", signed=True),
+             _growth, "net growth", "biomass and substrates", signed=True),
 )
 
 def _total(name: str, of: Quantity) -> Quantity:
