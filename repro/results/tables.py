@@ -149,8 +149,9 @@ class Results(Mapping[str, np.ndarray]):
 
         Notes
         -----
-        A time costs at most a step of a run in memory beyond the row before it. For a run in a
-        folder it costs as much as the run to this time. The last eight times are kept.
+        A time costs as much as the run from the row before it, for results in memory. For a run in
+        a folder it costs as much as the run from t = 0, or from the state saved near its end, which
+        is also its only one. The last eight times are kept.
 
         Examples
         --------
