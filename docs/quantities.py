@@ -1,12 +1,13 @@
 """Tables of all reported quantities, from their definitions: python docs/quantities.py > docs/quantities.md"""
 from repro.report.quantities import DERIVED
 from repro.results.arrays import ARRAYS
-from repro.results.columns import BODY, DETACHED, LEDGER, SERIES
+from repro.results.columns import BODY, DETACHED, LEDGER, RATES, SERIES, TOTALS
 from repro.runs.history import COUNTS
 from repro.sweeps.table import NUMBERS
 
 TABLES = {
-    "Columns of `timeseries.csv` and `table.csv`": SERIES,
+    "Columns of `timeseries.csv` and `table.csv`": (*SERIES, *RATES),
+    "Columns of these tables with `pore.depth`": TOTALS,
     "Columns of each aggregate in these tables if there are several": BODY,
     "Columns of `ledger.csv`, a row a step": (*LEDGER, DETACHED),
     "Arrays of the `.vtu` files": ARRAYS,

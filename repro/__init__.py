@@ -4,13 +4,13 @@ Ten lines of use; ``docs/tutorial.md`` of the repository has more:
 
     import repro
 
-    scene = repro.load_scene("base", ['growth.end="5 h"'])  # a packaged scene, a file or a dict
-    print(scene)                                            # its TOML, every key with its unit
-    print(repro.check(scene))                               # expected model, mesh and cost
-    results = repro.solve(scene)                            # rows of timeseries.csv, as arrays
+    scene = repro.load_scene("base", {"growth.end": "5 h"})  # a packaged scene, a file or a dict
+    print(scene)                                             # its TOML, every key with its unit
+    print(repro.check(scene))                                # expected model, mesh and cost
+    results = repro.solve(scene)                             # rows of timeseries.csv, as arrays
     print(results["conductivity_m_per_d"], results.units["conductivity_m_per_d"])
-    results = repro.run(scene, "runs/base")                 # the same as files, and a page
-    repro.load_run("runs/base").plot("acceptor", time=3)    # and .plot(), .animate(), .to_pandas()
+    results = repro.run(scene, "runs/base")                  # the same as files, and a page
+    repro.load_run("runs/base").plot("acceptor", time=3)     # and .plot(), .animate(), .to_pandas()
     repro.sweep(scene, ["pore.width=50 um, 60 um"], "sweep")
 
 Functions; every argument after these is given by its name:

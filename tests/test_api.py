@@ -38,8 +38,12 @@ def test_results_lack_quantities_that_are_not_modelled():
 
 
 def test_another_time_is_refused_by_the_nearest(solved):
+    """By the times of the run, or by the rows beside it where the scene is not known."""
+    with pytest.raises(KeyError, match="7.0 h: outside the run, from 0 to 0.6 h"):
+        solved.fields(7.0)
+    rows = [dict.fromkeys(results.COLUMNS) | {"time_h": time} for time in solved.time]
     with pytest.raises(KeyError, match="0.55 h: not .* the nearest rows are at 0.4 and 0.6 h, of 4 from 0 to 0.6 h"):
-        solved.fields(0.55)
+        Results("x", rows, [{}] * 4, "completed").fields(0.55)
 
 
 def test_a_time_may_have_a_unit(solved):
@@ -125,7 +129,7 @@ def test_a_loaded_run_equals_the_solved_one(solved, tmp_path):
     """Rows, the table and fields agree to the last bit, also in a folder without fields."""
     repro.run(load_scene("base", SHORT), str(tmp_path))
     loaded, table = repro.load_run(tmp_path), results.read_table(tmp_path / "timeseries.csv")
-    assert list(table) == results.COLUMNS and loaded.units == solved.units
+    assert list(table) == results.column_names(load_scene("base")) and loaded.units == solved.units
     table = {name: column for name, column in table.items() if not np.isnan(column).all()}
     assert list(loaded) == list(solved) == list(table)
     assert repr(loaded) == repr(solved) and solved.status == "completed"

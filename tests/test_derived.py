@@ -152,12 +152,17 @@ def arcs(pore):
 
 def total_uptake(scene, pore, state):
     """(2,) uptake of acceptor and donor (um2 mg/L/h) from (7) and (8) as printed."""
-    pieces, total = pore.space.reaction, np.zeros(2)
+    return -total_rates(scene, pore, state)[:2]
+
+
+def total_rates(scene, pore, state):
+    """(4,) F1 to F4 (um2 mg/L/h), the rates (7)-(10) as printed, of all biomass."""
+    pieces, total = pore.space.reaction, np.zeros(4)
     for nodes, masses in zip(pieces.cells, pore.active):
         for N, X in zip(pieces.values, masses):
             known = (max(N @ field[nodes], 0.0) for field in (state.acceptor, state.donor))
             rates = oracles.rates(*known, **rate_constants(scene))
-            total -= X * np.array(rates[:2])
+            total += X * np.array(rates)
     return total
 
 
@@ -184,6 +189,8 @@ def derived_row(scene, instant):
         supplied = getattr(scene.substrates, name).supply * inflow
         assert abs(supplied - integrate_over_end(pore.space, last, u_x, field) - uptake[k]) <= 1e-9 * supplied
         derived[f"{name}_balance"] = 0.0
+        derived[f"{name}_uptake_ug_per_m_per_h"] = 1e-6 * uptake[k]
+    derived["biomass_growth_ug_per_m_per_h"] = 1e-6 * total_rates(scene, pore, state)[2:].sum()
     x, y = arcs(pore).T
     at_points, weights = rule(8)
     body = pore.mesh.cells[pore.mesh.biomass]

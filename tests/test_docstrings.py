@@ -17,7 +17,8 @@ from tests.blocks import ROOT
 from tests.test_architecture import modules
 
 USERS = [f"repro.{name}" for name in dir(repro)]
-METHODS = [f"repro.Results.{name}" for name in ("animate", "fields", "plot", "to_netcdf", "to_pandas", "to_xarray")]
+METHODS = [f"repro.Results.{name}" for name in (
+    "animate", "drawable", "fields", "outline", "plot", "probe", "profile", "to_netcdf", "to_pandas", "to_xarray")]
 #: Functions and classes that CONTRIBUTING.md names, and the classes of the entries of the lists that it names.
 CONTRIBUTORS = [
     "repro.timing.timed", "repro.errors.StageError", "repro.errors.failing_as", "repro.fem.space.Space",

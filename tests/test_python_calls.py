@@ -5,14 +5,17 @@ import io
 import pydoc
 from contextlib import redirect_stderr
 from functools import partial
+from typing import get_type_hints
 
 import numpy as np
+import pint
 import pytest
 
 import repro
 from repro.cli import main
 from repro.errors import OutputError
 from repro.scene import SceneError
+from repro.scene.arguments import Overrides
 from tests import faults
 from tests.strategies import same_arrays
 
@@ -42,9 +45,12 @@ def test_a_run_takes_overrides_and_a_list_extends_it(tmp_path):
 
 
 WRONG = [
-    (repro.run, ("base", "out", "growth.end=1 h"), {}, "run: overrides: a list of str is needed, not 'growth.end=1 h'"),
-    (repro.run, ("base", "out", lambda time: None), {}, "run: overrides: a list of str is needed, not a function"),
-    (repro.run, ("base", "out", [1]), {}, r"run: overrides: a list of str is needed, not \[1\]"),
+    (repro.run, ("base", "out", "growth.end=1 h"), {},
+     "run: overrides: a list of str or dict is needed, not 'growth.end=1 h'"),
+    (repro.run, ("base", "out", lambda time: None), {},
+     "run: overrides: a list of str or dict is needed, not a function"),
+    (repro.run, ("base", "out", [1]), {},
+     r"run: overrides: a list of str or dict is needed, not \[1\]"),
     (repro.run, (3, "out"), {}, "run: scene: Scene or str or Path or dict is needed, not 3"),
     (repro.run, ("base", "out"), {"progress": print}, "run: progress: bool is needed, not <built-in function print>"),
     (repro.resume, (None,), {}, "resume: folder: str or Path is needed, not None"),
@@ -52,7 +58,7 @@ WRONG = [
     (repro.sweep, ("base", "pore.width=50 um", "out"), {}, "sweep: vary: a list of str is needed"),
     (repro.sweep, ("base", ["pore.width=50 um"], "out"), {"samples": 2.5}, "sweep: samples: int is needed, not 2.5"),
     (repro.compare, ("out", "both.html"), {}, "compare: folders: a list of str or Path is needed, not 'out'"),
-    (repro.simulate, ("base", ((-5, 0), (0, 5), (5, 0))), {}, "simulate: overrides: a list of str is needed"),
+    (repro.simulate, ("base", ((-5, 0), (0, 5), (5, 0))), {}, "simulate: overrides: a list of str or dict is needed"),
 ]
 
 
@@ -76,6 +82,45 @@ def test_numbers_and_arrays_of_numpy_are_accepted():
     assert repro.load_scene("base", unset=("flow.head",), overrides=("flow.mean_velocity=1 m/day",)).flow.head is None
     outline = np.array([[-5.0, 0], [0, 5], [5, 0]])
     assert next(repro.simulate("base", SHORT, shape=outline, unset=[])).pore.outline.thickness == pytest.approx(5)
+
+
+def test_every_function_takes_a_dict_of_overrides():
+    hints = {name: get_type_hints(getattr(repro, name)) for name in ORDER}
+    assert all(each["overrides"] == Overrides for each in hints.values() if "overrides" in each)
+
+
+class Stand:
+    """A quantity of another package than pint."""
+
+    magnitude = np.float32(0.25)
+    units = "centimeter ** 2 / day"
+
+
+def test_overrides_are_a_dict_with_values_of_numpy_and_pint(tmp_path):
+    """The same scene as from texts, also in a recorded run."""
+    changes = {"pore.width": pint.Quantity(0.06, "mm"), "kinetics.maximum_utilization_rate": "4.3 1/day",
+               "kinetics.yield_coefficient": np.float64(0.5), "flow.viscosity_ratio": pint.Quantity(500, ""),
+               "aggregate.outline": pint.Quantity(np.array([[-5, 0], [0, 5], [5.0, 0]]), "um"),
+               "substrates.acceptor.diffusivity": Stand(), "aggregate.smooth": np.bool_(True),
+               "substrates.donor.supply": {"table": [["0 h", "5 mg/L"], ["1 h", "6 mg/L"]], "between": "linear"}}
+    texts = ["pore.width=60 um", "kinetics.maximum_utilization_rate=4.3 1/day", "kinetics.yield_coefficient=0.5",
+             "flow.viscosity_ratio=500", 'aggregate.outline=[["-5 um", "0 um"], ["0 um", "5 um"], ["5 um", "0 um"]]',
+             "substrates.acceptor.diffusivity=0.25 cm^2/day", "aggregate.smooth=true",
+             'substrates.donor.supply={table=[["0 h", "5 mg/L"], ["1 h", "6 mg/L"]], between="linear"}']
+    expected = repro.load_scene("base", texts, unset=["aggregate.radius"])
+    assert repro.load_scene("base", changes, unset=["aggregate.radius"]) == expected
+    first = repro.run("base", tmp_path / "run", dict(each.split("=") for each in SHORT))
+    longer = repro.resume(tmp_path / "run", {"growth.end": pint.Quantity(24, "min")})
+    assert (first.time[-1], longer.time[-1]) == (0.2, 0.4)
+
+
+@pytest.mark.parametrize("changes, message", [
+    ({"pore.width": None}, "overrides: pore.width: a text with a unit, a number, true or false, a list, or a value "
+                           "of NumPy or pint is needed, not NoneType"),
+    ({5: "um"}, "overrides: the key 5: a text such as pore.width is needed")])
+def test_a_dict_of_overrides_without_meaning_is_refused(changes, message):
+    with pytest.raises(TypeError, match=f"^load_scene: {message}$"):
+        repro.load_scene("base", changes)
 
 
 def test_errors_name_arguments_in_python_and_options_on_the_command_line(tmp_path, capsys):

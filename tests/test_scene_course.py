@@ -62,12 +62,16 @@ def test_a_table_in_steps_may_say_so_and_keeps_its_unit():
     assert linear.substrates.donor.supply.at(1.0) == 1500.0
 
 
+#: What a table of the drive leaves out of base, and what it needs beside it.
+DRIVEN_BY = {"flow.mean_velocity": (["flow.head"], []), "flow.rate": (["flow.head"], ["pore.depth=10 um"])}
+
+
 @pytest.mark.parametrize("key", TIMED)
 def test_every_key_that_takes_a_table_has_steps_or_changes_linearly(key):
     table = [[time, TIMED[key].write(value)] for time, value in (("0 h", 2.0), ("1 h", 6.0), ("4 h", 3.0))]
-    without = ["flow.head"] if key.endswith("mean_velocity") else []
+    without, beside = DRIVEN_BY.get(key, ([], []))
     for word, expected in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
-        loaded = load_scene("base", [f"{key}={between(word, table)}"], unset=without)
+        loaded = load_scene("base", [f"{key}={between(word, table)}", *beside], unset=without)
         assert [attrgetter(key)(loaded.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(expected, rel=1e-15)
         assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
 
@@ -76,11 +80,11 @@ def test_every_key_that_takes_a_table_has_steps_or_changes_linearly(key):
 def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(key):
     """Two rows of one state, with the values before and after the jump, tell which columns jump. Bounds of substrates
     may be zero in both."""
-    without = ["flow.head"] if key.endswith("mean_velocity") else []
-    size = 1e5 if without else 5.0
+    without, beside = DRIVEN_BY.get(key, ([], []))
+    size = {"flow.mean_velocity": 1e5, "flow.rate": 5e7}.get(key, 5.0)
     table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", size), ("2 h", 2 * size))])
     loaded = load_scene("base", [f"{key}={table}", "growth.tensile_strength=1 MPa", "numerics.refinement=0.3",
-                                 "aggregate.radius=20 um"], unset=without)
+                                 "aggregate.radius=20 um", *beside], unset=without)
     seed = seeded(loaded)
     rows = []
     for time in (0.0, 2.0):
@@ -96,9 +100,9 @@ def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(key):
 
 @pytest.mark.parametrize("key", TIMED)
 def test_check_describes_every_table(key):
-    without = ["flow.head"] if key.endswith("mean_velocity") else []
+    without, beside = DRIVEN_BY.get(key, ([], []))
     table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 1e4), ("2 h", 3e4))])
-    described = dict(describe_model(load_scene("base", [f"{key}={table}"], unset=without)))
+    described = dict(describe_model(load_scene("base", [f"{key}={table}", *beside], unset=without)))
     assert ", in steps, the last from 2 h" in described[key.partition(".")[0]]
 
 

@@ -13,10 +13,10 @@ from repro.scene.text import scene_text
 from tests.blocks import ROOT
 
 #: Keys that exclude another one that is set: they stay commented out.
-OTHER_DRIVE = {"head", "mean_velocity"}
+OTHER_DRIVE = {"head", "mean_velocity", "rate"}
 #: Keys without a default: the text has an example.
 EXAMPLES = {"times", "every", "outline", "name", "donor_oxygen_demand", "permeability", "bonding_strength",
-            "tensile_strength"}
+            "tensile_strength", "depth"}
 
 
 def fields(kind, above=""):
@@ -70,8 +70,8 @@ def test_the_output_is_the_scene_alone(name, preset, capsys):
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_every_key_may_be_made_active_at_once(name):
     drive = load_scene(name).flow
-    excluded = "head" if drive and drive.head is None else "mean_velocity"
-    scene = parsed(uncommented(scene_text(name), left_out={excluded, "outline", "permeability"}), name)
+    excluded = {"rate", "head" if drive and drive.head is None else "mean_velocity"}
+    scene = parsed(uncommented(scene_text(name), left_out={*excluded, "outline", "permeability"}), name)
     assert None not in (scene.aggregate, scene.flow, scene.substrates, scene.kinetics, scene.growth)
     assert scene.output.times == (5.0, 18.0)
 

@@ -5,17 +5,26 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from repro.errors import RunEnd
 from repro.fem.linear import Method
-from repro.march.state import Report, RestartState, contiguous, initial_report, stopping
+from repro.march.state import (
+    SAME_TIME,
+    Report,
+    RestartState,
+    contiguous,
+    initial_report,
+    stopping,
+)
 from repro.march.step_control import STRETCH, StepControl
 from repro.model.grading import solve_graded
 from repro.model.meshing import seeded
 from repro.scene import Scene, SceneError, Source, load_scene, parse_scene, scene_tables
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.schemes import Scheme
 
 if TYPE_CHECKING:
@@ -26,7 +35,7 @@ Shape = Sequence[tuple[float, float]] | np.ndarray
 
 
 @typed
-def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+def simulate(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
              scheme: Scheme | None = None, shape: Shape | None = None,
              state: RestartState | None = None) -> Iterator[Report]:
     """Simulate a scene, and yield a Report at t = 0 and at each reported time.
@@ -39,7 +48,7 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
     ----------
     scene : Scene, str, Path or dict
         A loaded scene, the name of a packaged scene, a TOML file, or a dict of tables.
-    overrides : sequence of str, optional
+    overrides : sequence of str or dict, optional
         Changes of the scene, as for :func:`repro.load_scene`.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
@@ -80,10 +89,10 @@ def simulate(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[st
     scene = load_scene(scene, overrides, unset=unset, scheme=scheme)
     if shape is not None:
         scene = shaped(scene, shape)
-    return _reports(steps(scene, state))
+    return reports(steps(scene, state))
 
 
-def _reports(states: Iterator[tuple[RestartState, Report | None]]) -> Iterator[Report]:
+def reports(states: Iterator[tuple[RestartState, Report | None]]) -> Iterator[Report]:
     """Yield the reports, and warn of each row that cannot be computed."""
     for state, report in states:
         if state.missing:
@@ -92,6 +101,23 @@ def _reports(states: Iterator[tuple[RestartState, Report | None]]) -> Iterator[R
                           f"{reason}", stacklevel=3)
         if report:
             yield report
+
+
+def report_at(scene: Scene, state: RestartState | None, time: float) -> Report:
+    """Return the Report of a row at a time (h), from an earlier state of the run or from t = 0.
+
+    Steps do not depend on rows, so that it is the one that the run would have had. Raises KeyError
+    if the state at this time cannot be computed.
+    """
+    reason = "the run ends before"
+    with suppress(RunEnd):
+        for after, report in steps(scene.reporting(time), state):
+            if after.missing:
+                reason = after.missing[1]
+                break
+            if report and abs(report.pore.time - time) <= SAME_TIME:
+                return report
+    raise KeyError(f"{time:g} h: the state cannot be computed: {reason}")
 
 
 def shaped(scene: Scene, shape: Shape) -> Scene:

@@ -104,11 +104,12 @@ def peclet(substrates: Substrates, width: float, speed: float) -> float:
 def thin_layers(scene: Scene) -> str:
     """Name the Peclet number of a scene with flow and substrates, and the keys that reduce it."""
     by_head = "flow.head or flow.gravity, a larger flow.kinematic_viscosity"
-    driven = needed(scene.flow, "a flow").head is not None
+    drive = needed(scene.flow, "a flow")
+    other = "flow.rate" if drive.rate is not None else "flow.mean_velocity"
     substrates = needed(scene.substrates, "substrates").modelled
     diffusivities = " and ".join(f"substrates.{name}.diffusivity*" for name in substrates)
     return (f"the Peclet number u W / D is {_largest_peclet(scene):.2g}; a smaller "
-            f"{by_head if driven else 'flow.mean_velocity'}, or larger {diffusivities} are needed")
+            f"{other if drive.head is None else by_head}, or larger {diffusivities} are needed")
 
 
 def fastest(drive: Drive, channel: Channel) -> float:

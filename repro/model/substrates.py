@@ -33,6 +33,16 @@ def solve(supplied: Substrates, kinetics: Kinetics | None, scheme: Scheme,
     return problem, state, transport.fluxes(problem, sink, state)
 
 
+def net_growth(problem: Problem, pore: Pore, state: Concentrations, constants: Kinetics) -> float:
+    """um2 mg/L/h, growth of X_A + X_I in all aggregates, F3 + F4 by the uptake and the unmet demand
+    (:mod:`repro.model.kinetics`)."""
+    balance = transport.Balance(problem, Sink(pore.active))
+    fields = state.fields.ravel()
+    acceptor, donor = uptakes(problem, pore, state).sum(axis=0) + balance.unmet(fields)
+    decayed = acceptor - constants.acceptor_to_donor_ratio * donor
+    return constants.yield_coefficient * donor - decayed / constants.decay_oxygen_demand
+
+
 @lru_cache(maxsize=1)
 def uptakes(problem: Problem, pore: Pore, state: Concentrations) -> np.ndarray:
     """(bodies, 2) um2 mg/L/h, uptake of acceptor and donor by each aggregate."""

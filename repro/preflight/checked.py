@@ -20,7 +20,7 @@ from repro.preflight.outlook import LIMIT, CoarseRun, Outlook
 from repro.preflight.resolved import find_unresolved_flow
 from repro.preflight.simplifications import Caveat, find_warnings, warn_missed_tolerance
 from repro.scene import Scene, Source, label, load_scene
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.scene.units import SceneError
 
 WIDTH = 110
@@ -62,7 +62,7 @@ class SceneCheck:
 
 
 @typed
-def check(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+def check(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
           run: bool = True) -> SceneCheck:
     """Check a scene before it is run, and run it coarsely for a few seconds.
 
@@ -70,7 +70,7 @@ def check(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
     ----------
     scene : Scene, str, Path or dict
         A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
-    overrides : sequence of str, optional
+    overrides : sequence of str or dict, optional
         Changes of the scene, as for :func:`repro.load_scene`.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.

@@ -61,7 +61,10 @@ def _seed(seed: Aggregate) -> str:
 def _flow(scene: Scene) -> Iterator[str]:
     flow = scene.flow
     yield "Stokes flow (1)-(6)"
-    if flow.head is None:
+    if flow.rate is not None:
+        rate = _over_time(flow.rate, 1e-9 / 60, "uL/min")
+        yield f"driven by {rate} through a depth of {scene.pore.depth:g} um"
+    elif flow.head is None:
         yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, 24e-6, 'm/day')}"
     else:
         yield f"driven by a head of {_over_time(flow.head, 1e-4, 'cm')} over the whole pore"

@@ -137,6 +137,8 @@ KINDS = (
          ("wall_traction_max_MPa", "tensile_stress_max_MPa")),
     Kind("Force of the fluid on the aggregate", "force",
          ("fluid_force_x_uN_per_m", "fluid_force_y_uN_per_m")),
+    Kind("Uptake and growth", "rate",
+         (*_pair("{}_uptake_ug_per_m_per_h"), "biomass_growth_ug_per_m_per_h")),
     *map(_ledger, SUBSTRATES),
     Kind("Ledger: biomass", "biomass", ("biomass_held_ug_per_m", "biomass_made_ug_per_m")),
     Kind("Defects of the balances", "relative defect",

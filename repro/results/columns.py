@@ -30,6 +30,7 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "seed": lambda scene, at: bool(scene.aggregates or at.pore.bodies),
     "aggregate": lambda scene, at: bool(at.pore.bodies),
     "biomass": lambda scene, at: bool(at.pore.bodies) and scene.kinetics is not None,
+    "substrates": lambda scene, at: at.solved.concentrations is not None,
     "growth": lambda scene, at: NEEDS["seed"](scene, at) and scene.growth is not None,
     "adhesion": lambda scene, at: (scene.growth is not None and bool(at.pore.bodies)
                                    and at.pore.accumulates and _has_adhesion(scene.growth))}
@@ -129,6 +130,11 @@ def _load(part: str, k: int, scene: Scene, at: Report) -> float:
 def _uptake(substrate: int, k: int, scene: Scene, at: Report) -> float:
     from repro.model.substrates import uptakes  # a scene without [substrates] does not load it
     return float(uptakes(at.solved.problem, at.pore, at.solved.concentrations)[k, substrate])
+
+
+def _growth(scene: Scene, at: Report) -> float:
+    from repro.model.substrates import net_growth
+    return net_growth(at.solved.problem, at.pore, at.solved.concentrations, scene.kinetics)
 
 
 def _film(k: int, scene: Scene, at: Report) -> float:
@@ -252,6 +258,40 @@ SERIES = (
              lambda scene, at: int(at.pore.contact), yes_no=True),
 )
 
+#: Columns of a scene with kinetics, after ``SERIES``: runs of earlier versions do not have them.
+RATES = (
+    *(Quantity(f"{name}_uptake_ug_per_m_per_h", f"uptake of the {name}",
+               "integral of (7)-(8) over the aggregates, at the present concentrations",
+               _all(partial(_uptake, k), sum), f"{name} uptake", f"{name} and biomass", signed=True)
+      for k, name in enumerate(SUBSTRATES)),
+    Quantity("biomass_growth_ug_per_m_per_h", "net growth of the biomass",
+             "integral of (9) + (10) over the aggregates, at the present concentrations",
+             _growth, "net growth", "biomass and substrates", signed=True),
+)
+
+def _total(name: str, of: Quantity) -> Quantity:
+    """The total of a quantity per depth, by the depth of the pore."""
+    words = of.words.replace("area", "volume")
+    return replace(of, name=name, words=f"{words}, over the depth",
+                   formula=f"{of.name} times pore.depth",
+                   value=lambda scene, at: scene.pore.depth * of.value(scene, at))
+
+
+_PER_DEPTH = {quantity.name: quantity for quantity in (*SERIES, *RATES)}
+#: Columns of a scene with a depth.
+TOTALS = (
+    Quantity("flow_rate_uL_per_min", "flow rate",
+             "u_ave W pore.depth, of the whole pore: with 2 W up to a plane of symmetry",
+             lambda scene, at: (scene.pore.depth * scene.pore.whole_width
+                                * _PER_DEPTH["mean_velocity_m_per_d"].value(scene, at)),
+             "flow rate", "flow"),
+    _total("aggregate_volume_um3", _PER_DEPTH["aggregate_area_um2"]),
+    *(_total(f"{name}_pg_per_h", _PER_DEPTH[f"{name}_ug_per_m_per_h"])
+      for name in (*(f"{substrate}_uptake" for substrate in SUBSTRATES), "biomass_growth")),
+    *(_total(f"fluid_force_{axis}_nN", _PER_DEPTH[f"fluid_force_{axis}_uN_per_m"])
+      for axis in "xy"),
+)
+
 #: Columns of each aggregate of a scene with several: value takes its place in the pore's list, the
 #: scene and a Report. NAME is its name, or its number from one. They are empty once it has left.
 BODY = (
@@ -308,10 +348,13 @@ def _of_named(value: Callable, name: str, scene: Scene, at: Report) -> float | N
 
 
 def series(scene: Scene) -> tuple[Quantity, ...]:
-    """The quantities of ``timeseries.csv`` of a scene: ``SERIES``, and ``BODY`` for each of several
-    aggregates."""
+    """The quantities of ``timeseries.csv`` of a scene: ``SERIES``, ``RATES`` with kinetics,
+    ``TOTALS`` with a depth, and ``BODY`` for each of several aggregates."""
     labels = scene.labels if len(scene.aggregates) > 1 else []
-    return *SERIES, *(of_body(quantity, label) for label in labels for quantity in BODY)
+    rates = RATES if scene.kinetics else ()
+    totals = TOTALS if scene.pore.depth else ()
+    bodies = (of_body(quantity, label) for label in labels for quantity in BODY)
+    return *SERIES, *rates, *totals, *bodies
 
 
 def column_names(scene: Scene) -> list[str]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from repro.errors import printable
-from repro.results import names
+from repro.results import names, outlines, quantities
 from repro.results.files import output_path
 from repro.results.jumps import with_jumps
+from repro.scene.units import to_internal
 
 if TYPE_CHECKING:
     from repro.results.tables import Results
@@ -26,12 +29,51 @@ PANELS: tuple[tuple[str, ...], ...] = (
 WIDTH, PANEL, ROOM = 7.0, 1.9, 1.2
 #: Time of a frame of a film, ms; resolution, dots per inch.
 FRAME, RESOLUTION = 120, 110
+#: ffmpeg's filter for sides of an even number of pixels, which the format of colours needs.
+EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
 OUTLINE = "#d7191c"
 PYPLOT = "matplotlib.pyplot"
 #: Nodes of the straight triangles that draw a triangle, by its number of nodes.
 PARTS = {3: [[0, 1, 2]], 6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]}
-#: Nodes along each edge of a triangle, by its number of nodes.
-EDGES = {3: [[0, 1], [1, 2], [2, 0]], 6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]]}
+#: A curve has a logarithmic axis where its largest value is this many times the least one.
+DECADES = 100.0
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a picture shows a quantity.
+
+    log: is its scale logarithmic? None: where a curve is positive and spans two decades; unit,
+    title, cmap: None for those of the quantity, the run and matplotlib.
+    """
+
+    log: bool | None = None
+    unit: str | None = None
+    title: str | None = None
+    cmap: str | None = None
+
+    def unit_of(self, name: str) -> tuple[str, float]:
+        """The unit in which a quantity is shown, and its factor from the unit of the name.
+
+        Raises ValueError if it is no unit of this quantity.
+        """
+        if self.unit is None:
+            return names.unit(name), 1.0
+        try:
+            return self.unit, to_internal(f"1 {quantities.plain(name)}", self.unit)
+        except (ValueError, OverflowError):
+            raise ValueError(f"unit: {self.unit!r}: a unit of {name}, such as "
+                             f"{quantities.plain(name)}, is needed") from None
+
+    def is_log(self, values: np.ndarray) -> bool:
+        """Does a curve with these values have a logarithmic axis?"""
+        shown = values[np.isfinite(values)]
+        if self.log is not None or not len(shown):
+            return bool(self.log)
+        return shown.min() > 0 and shown.max() >= DECADES * shown.min()
+
+
+PLAIN = Style()
 
 
 def optional(module: str) -> Any:
@@ -51,15 +93,16 @@ def full_name(name: str, known: Sequence[str]) -> str:
     return matching[0] if matching else ""
 
 
-def curves(results: Results, drawn: Sequence[Sequence[str]], ax: Any = None) -> list[Any]:
+def curves(results: Results, drawn: Sequence[Sequence[str]], ax: Any = None,
+           style: Style = PLAIN) -> list[Any]:
     """Draw columns over time, a panel for each tuple of names; returns the axes of the panels."""
     axes = _panels(len(drawn)) if ax is None else list(np.ravel(ax))
     if len(axes) != len(drawn):
         raise ValueError(f"ax: {len(drawn)} axes are needed, not {len(axes)}")
     for panel, columns in zip(axes, drawn):
-        _draw_panel(panel, results, columns)
+        _draw_panel(panel, results, columns, style)
     axes[-1].set_xlabel("time (h)")
-    axes[0].set_title(_plain(results.name), loc="left")
+    axes[0].set_title(_plain(style.title or results.name), loc="left")
     return axes
 
 
@@ -75,16 +118,19 @@ def _panels(count: int) -> list[Any]:
     return list(axes[:, 0])
 
 
-def _draw_panel(ax: Any, results: Results, columns: Sequence[str]) -> None:
+def _draw_panel(ax: Any, results: Results, columns: Sequence[str], style: Style) -> None:
     """Draw columns in one unit, and the time of contact; a point if there is one row."""
     marker = "o" if len(results.time) == 1 else ""
+    unit, factor = style.unit_of(columns[0])
     for name in columns:
         times, values = with_jumps(name, results.time, results[name], results.tables)
-        ax.plot(times, values, marker=marker, label=names.label(name))
+        ax.plot(times, factor * values, marker=marker, label=names.label(name))
+    if style.is_log(np.concatenate([results[name] for name in columns])):
+        ax.set_yscale("log")
     if marker:
         ax.set_xticks(results.time)
     many = len(columns) > 1
-    ax.set_ylabel(f"{_common(columns)}\n({names.unit(columns[0]) or '1'})")
+    ax.set_ylabel(f"{_common(columns)}\n({unit or '1'})")
     ax.grid(alpha=0.3)
     touching = results.time[results["contact"] == 1] if "contact" in results else []
     if len(touching):
@@ -101,25 +147,80 @@ def _common(columns: Sequence[str]) -> str:
 
 
 def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = None,
-          limits: np.ndarray | None = None, box: np.ndarray | None = None) -> Any:
+          limits: np.ndarray | None = None, box: np.ndarray | None = None,
+          style: Style = PLAIN) -> Any:
     """Draw a field with the outline of the aggregate and a colour bar; returns the axes.
 
     Vectors are drawn by their lengths. limits: values of the first and last colour; box: lower left
     and upper right corner (um). By default, they fit the field.
     """
-    values = magnitude(fields[name])
+    unit, _ = style.unit_of(name)
+    values = shown(fields, name, style)
     limits = value_range(values) if limits is None else limits
     box = corners(fields) if box is None else box
     if ax is None:
         _, ax = optional(PYPLOT).subplots(figsize=field_size(box), layout="constrained")
-    image = _image(ax, fields, values)
+    image = _image(ax, fields, values, style.cmap)
+    if style.log:
+        image.set_norm(optional("matplotlib.colors").LogNorm())
     image.set_clim(*limits)
     _draw_outline(ax, fields)
     bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.02, 0, 0.02, 1]))
-    bar.formatter.set_powerlimits((-3, 4))
+    if not style.log:
+        bar.formatter.set_powerlimits((-3, 4))
     ax.set(xlabel="x (um)", ylabel="y (um)", aspect="equal", facecolor="0.85",
            xlim=box[:, 0], ylim=box[:, 1])
-    ax.set_title(_plain(f"{title}: {names.with_unit(name)}"), loc="left")
+    ax.set_title(_plain(f"{title}: {names.with_unit(name, unit)}"), loc="left")
+    return ax
+
+
+def shown(fields: Mapping[str, np.ndarray], name: str, style: Style) -> np.ndarray:
+    """(N,) or (T,) values of a field in the unit of a picture; NaN where a logarithm has none."""
+    values = style.unit_of(name)[1] * magnitude(fields[name])
+    return np.where(values > 0, values, np.nan) if style.log else values
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """A microscope image: file or array, um per pixel, and (x, y) um of its lower left corner, by
+    default with the middle of its lower edge at the origin."""
+
+    image: Any
+    um_per_pixel: float
+    corner: Sequence[float] | None = None
+
+    def draw(self, ax: Any, factor: float) -> None:
+        """Draw the image in the coordinates of the pore; factor: of their unit, from um."""
+        read = optional(PYPLOT).imread
+        pixels = read(self.image) if isinstance(self.image, str | Path) else self.image
+        height, width = factor * self.um_per_pixel * np.array(np.shape(pixels)[:2])
+        left, low = factor * np.array(self.corner) if self.corner else (-width / 2, 0.0)
+        ax.imshow(pixels, extent=(left, left + width, low, low + height), cmap="gray")
+
+
+def drawn_outlines(lines: Sequence[outlines.Outline], title: str, box: np.ndarray, ax: Any = None,
+                   photograph: Photograph | None = None, style: Style = PLAIN) -> Any:
+    """Draw outlines, coloured by their times, over an image if there is one; returns the axes.
+
+    box: lower left and upper right corner (um) of the pore.
+    """
+    unit, factor = style.unit_of("outline_um")
+    if ax is None:
+        _, ax = optional(PYPLOT).subplots(figsize=field_size(box), layout="constrained")
+    low, high = factor * box
+    if photograph:
+        photograph.draw(ax, factor)
+    else:
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        ax.hlines([low[1], high[1]], low[0], high[0], color="0.4")
+    collection = optional("matplotlib.collections").LineCollection
+    drawn = collection([factor * each.points for each in lines], cmap=style.cmap, linewidths=1.5,
+                       array=np.array([each.time for each in lines]))
+    ax.add_collection(drawn)
+    if len({each.time for each in lines}) > 1:
+        ax.figure.colorbar(drawn, cax=ax.inset_axes([1.02, 0, 0.02, 1])).set_label("time (h)")
+    ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", aspect="equal")
+    ax.set_title(_plain(title), loc="left")
     return ax
 
 
@@ -174,7 +275,8 @@ def corners(fields: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray) -> Any:
+def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray,
+           cmap: str | None) -> Any:
     """Draw values at nodes smoothly, and values in triangles as they are; NaN stays empty."""
     cells = fields["triangles"]
     parts = np.array(PARTS[cells.shape[1]])
@@ -185,66 +287,81 @@ def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray) -> Any
     missing = np.isnan(colours) if in_triangles else np.isnan(colours[triangles]).any(axis=1)
     kind = {"facecolors": colours[~missing]} if in_triangles else {"shading": "gouraud"}
     at_nodes = () if in_triangles else (np.nan_to_num(colours),)
-    return ax.tripcolor(x, y, *at_nodes, triangles=triangles[~missing], rasterized=True, **kind)
+    return ax.tripcolor(x, y, *at_nodes, triangles=triangles[~missing], rasterized=True, cmap=cmap,
+                        **kind)
 
 
 def _draw_outline(ax: Any, fields: Mapping[str, np.ndarray]) -> None:
-    """Draw the edges that the aggregate shares with the fluid."""
-    cells = fields["triangles"]
-    edges = cells[:, EDGES[cells.shape[1]]]
-    inside = np.repeat(fields["region"] > 0.5, 3)
-    edges = edges.reshape(-1, edges.shape[2])
-    ends = np.sort(edges[:, [0, -1]], axis=1)
-    _, edge = np.unique(ends, axis=0, return_inverse=True)
-    edge = edge.ravel()
-    shared = (np.bincount(edge[inside], minlength=edge.max() + 1) == 1) & (np.bincount(edge) == 2)
-    lines = fields["places_um"][edges[inside & shared[edge]]]
+    """Draw the edges that the aggregate shares with the fluid, as curves where they are curved."""
+    edges, shared = outlines.boundary(fields["triangles"], fields["region"] > 0.5)
+    lines = outlines.curved(fields["places_um"][edges[shared]])
     collection = optional("matplotlib.collections").LineCollection
     ax.add_collection(collection(lines, colors=OUTLINE, linewidths=1.5, capstyle="round"))
 
 
-def film(results: Results, name: str, file: Path, ax: Any = None) -> Any:
-    """Write the fields of all rows as an animated GIF; returns the axes with the last one.
+def film(results: Results, name: str, file: Path, ax: Any = None, style: Style = PLAIN) -> Any:
+    """Write the fields of all rows as an animated GIF or an MP4; returns the axes with the last
+    one.
 
     Colours and the view are the same in all frames.
     """
+    write = _write_mp4 if file.suffix == ".mp4" else _write_gif
     with output_path(file) as beside:
-        images, ax = _frames(results, name, ax)
-        images[0].save(beside, format="GIF", save_all=True, append_images=images[1:],
-                       duration=FRAME, loop=0)
-    return ax
+        return write(beside, partial(_frames, results, name, style), ax, style)
 
 
-def _frames(results: Results, name: str, ax: Any) -> tuple[list, Any]:
-    """The pictures of all rows, and the axes with the last one."""
-    rows = [(time, results.fields(time)) for time in results.time]
-    bounds = np.array([value_range(magnitude(fields[name])) for _, fields in rows])
-    boxes = np.array([corners(fields) for _, fields in rows])
-    limits = np.array([bounds[:, 0].min(), bounds[:, 1].max()])
-    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+def _write_gif(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any, style: Style) -> Any:
     images = []
+    for last in frames(ax):
+        images.append(_frame(last.figure, style))
+    images[0].save(file, format="GIF", save_all=True, append_images=images[1:], duration=FRAME,
+                   loop=0)
+    return last
+
+
+def _write_mp4(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any, style: Style) -> Any:
+    """Write frames by ffmpeg. Raises ImportError if it is not installed."""
+    writer = optional("matplotlib.animation").FFMpegWriter
+    if not writer.isAvailable():
+        raise ImportError("the program ffmpeg is not installed; a film as .gif needs none")
+    films = writer(fps=1000 / FRAME, extra_args=["-pix_fmt", "yuv420p", "-vf", EVEN])
+    for number, last in enumerate(frames(ax)):
+        if number == 0:
+            films.setup(last.figure, file, RESOLUTION)
+        films.grab_frame()
+        last.figure.set_layout_engine("none")
+    films.finish()
+    return last
+
+
+def _frames(results: Results, name: str, style: Style, ax: Any) -> Iterator[Any]:
+    """Draw the rows one after the other; yields the axes."""
+    rows = [(time, results.fields(time)) for time in results.time]
+    bounds = np.array([value_range(shown(fields, name, style)) for _, fields in rows])
+    boxes = np.array([corners(fields) for _, fields in rows])
+    limits = np.array([np.nanmin(bounds[:, 0]), np.nanmax(bounds[:, 1])])
+    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     for time, fields in rows:
         if ax is not None:
             ax.clear()
-        ax = field(fields, name, heading(results, time), ax, limits, box)
-        images.append(_frame(ax.figure))
-    return images, ax
+        ax = field(fields, name, heading(results, time, style), ax, limits, box, style)
+        yield ax
 
 
-def _frame(figure: Any) -> Any:
+def _frame(figure: Any, style: Style) -> Any:
     """The picture of a figure, in the colours of a film; later frames keep its layout."""
     image = optional("PIL.Image")
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=RESOLUTION)
     figure.set_layout_engine("none")
     palette = image.new("P", (1, 1))
-    palette.putpalette(_palette().tobytes())
+    palette.putpalette(_palette(style).tobytes())
     return image.open(content).convert("RGB").quantize(palette=palette, dither=0)
 
 
-def _palette() -> np.ndarray:
+def _palette(style: Style) -> np.ndarray:
     """(256, 3) colours of a film: those of the fields, greys, and shades of the outline."""
-    map_colours = optional(PYPLOT).get_cmap()(np.linspace(0, 1, 216))[:, :3]
+    map_colours = optional(PYPLOT).get_cmap(style.cmap)(np.linspace(0, 1, 216))[:, :3]
     greys = np.repeat(np.linspace(0, 1, 32)[:, None], 3, axis=1)
     outline = np.array(optional("matplotlib.colors").to_rgb(OUTLINE))
     shades = [outline + share * (map_colours[k] - outline)
@@ -253,6 +370,6 @@ def _palette() -> np.ndarray:
     return (255 * colours).round().astype(np.uint8)
 
 
-def heading(results: Results, time: float) -> str:
-    """The name of a scene and a time (h)."""
-    return f"{results.name}, t = {time:.4g} h"
+def heading(results: Results, time: float, style: Style = PLAIN) -> str:
+    """The title of a picture, by default the name of the scene, and a time (h)."""
+    return f"{style.title or results.name}, t = {time:.4g} h"

@@ -7,12 +7,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from repro.results.arrays import ARRAYS
-from repro.results.columns import BODY, DETACHED, LEDGER, SERIES, of_body
+from repro.results.columns import BODY, DETACHED, LEDGER, RATES, SERIES, TOTALS, of_body
 from repro.results.quantities import SMALLER, Quantity, ending, unit_of
 
 #: Every column and array by its name.
 KNOWN: dict[str, Quantity] = {quantity.name: quantity
-                              for quantity in (*LEDGER, DETACHED, *SERIES, *ARRAYS)}
+                              for quantity in (*LEDGER, DETACHED, *SERIES, *RATES, *TOTALS,
+                                               *ARRAYS)}
 #: Ends of the columns that are coordinates. A percentage of one has no meaning.
 COORDINATES = ("stream_um", "_x_um", "_y_um")
 #: Pure numbers that stand for yes (1) and no (0).

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from html import escape
 from importlib import import_module
 from pathlib import Path
@@ -13,18 +14,24 @@ import numpy as np
 
 from repro import results
 from repro.errors import RunEnd
-from repro.march.simulation import simulate
-from repro.march.state import SAME_TIME
-from repro.results import drawing, names, netcdf, picture
+from repro.march.simulation import report_at, reports, steps
+from repro.march.state import SAME_TIME, Report, RestartState
+from repro.results import drawing, names, netcdf, outlines, picture, sampling
+from repro.results.drawing import Photograph, Style
 from repro.results.field_files import Grid
 from repro.results.netcdf import TIME
+from repro.results.outlines import Outline
 from repro.results.quantities import plain as unit
-from repro.scene import Source, load_scene, scene_tables
-from repro.scene.arguments import typed
+from repro.scene import Scene, Source, bodies, load_scene, scene_tables
+from repro.scene.arguments import Overrides, typed
 from repro.scene.units import to_internal
 from repro.schemes import Scheme
 from repro.timing import progress_bar
 
+#: The name of the picture of all outlines.
+OUTLINES = "outlines"
+#: Number of outlines that a picture shows, if no times are given.
+MOST_OUTLINES = 10
 #: Number of first and of last times in the table of a notebook.
 END_TIMES = 5
 
@@ -48,6 +55,8 @@ class Results(Mapping[str, np.ndarray]):
         Tables of the scene, with units; curves jump where its tables over time do.
     provenance : mapping, optional
         ``hash`` of the scene and ``versions`` of the packages, for :meth:`to_netcdf`.
+    rerun : callable, optional
+        Computes the fields at a time (h) between rows.
 
     Notes
     -----
@@ -64,7 +73,8 @@ class Results(Mapping[str, np.ndarray]):
     def __init__(self, name: str, rows: list[dict[str, float | None]],
                  fields: Sequence[Mapping[str, np.ndarray]], status: str,
                  folder: Path | None = None, tables: Mapping[str, dict] | None = None,
-                 provenance: Mapping[str, Any] | None = None):
+                 provenance: Mapping[str, Any] | None = None,
+                 rerun: Callable[[float], dict[str, np.ndarray]] | None = None):
         self.columns: dict[str, np.ndarray] = {}
         for key in dict.fromkeys([*results.COLUMNS, *(rows[0] if rows else ())]):
             values = [row[key] for row in rows]
@@ -77,6 +87,7 @@ class Results(Mapping[str, np.ndarray]):
         self.tables = tables or {}
         self.provenance = provenance or {}
         self._fields = fields
+        self._rerun = lru_cache(maxsize=8)(rerun) if rerun else None
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.columns:
@@ -108,14 +119,19 @@ class Results(Mapping[str, np.ndarray]):
 
     @typed
     def fields(self, time: float | str, method: str | None = None) -> Mapping[str, np.ndarray]:
-        """Return the fields at a reported time.
+        """Return the fields at a time within the run.
+
+        Those between rows are computed again from the nearest earlier state: that of a row of a run
+        in memory, or the last saved state of a run in a folder, which has none before its end. They
+        equal those of a row at this time to the last bit, unless versions have changed since, which
+        issues a warning. The folder stays as it is.
 
         Parameters
         ----------
         time : float or str
             Hours, or a text with a unit such as "90 min".
         method : str, optional
-            "nearest" takes the nearest row; by default, the time must be that of a row.
+            "nearest" takes the nearest row, without a computation.
 
         Returns
         -------
@@ -127,9 +143,15 @@ class Results(Mapping[str, np.ndarray]):
         Raises
         ------
         KeyError
-            If the time is not a reported one: names the rows beside it.
+            If the time is outside the run: names its times.
         ValueError
             If the method is another one, or a text is not a time.
+
+        Notes
+        -----
+        A time costs as much as the run from the row before it, for results in memory. For a run in
+        a folder it costs as much as the run from t = 0, or from the state saved near its end, which
+        is also its only one. The last eight times are kept.
 
         Examples
         --------
@@ -138,17 +160,32 @@ class Results(Mapping[str, np.ndarray]):
         >>> fields["places_um"].shape[1], fields["triangles"].shape[1]
         (2, 3)
         """
-        return self._fields[self._row(time, method)]
+        hours = _hours(time)
+        row = self._row(hours, method)
+        if row is not None:
+            return self._fields[row]
+        if self._rerun and len(self.time):
+            end = self._end
+            if 0 <= hours <= end:
+                return self._rerun(hours)
+            raise KeyError(f"{hours} h: outside the run, from 0 to {end:g} h")
+        raise KeyError(f"{hours} h: not a reported time; {self._rows_beside(hours)}")
 
-    def _row(self, time: float | str, method: str | None = None) -> int:
-        """Find the row at, or nearest to, a time."""
-        time = _hours(time)
+    @property
+    def _end(self) -> float:
+        """Time (h) that the run has reached; a run that ends otherwise has a row then."""
+        growth = self.tables.get("growth", {})
+        completed = self.status == "completed" and "end" in growth
+        return to_internal(growth["end"], "h") if completed else float(self.time[-1])
+
+    def _row(self, time: float, method: str | None = None) -> int | None:
+        """Find the row at, or nearest to, a time (h)."""
         if method not in (None, "nearest"):
             raise ValueError(f'method: None or "nearest" is needed, not {method!r}')
         distance = np.abs(self.time - time)
         if len(distance) and (distance.min() <= SAME_TIME or method and np.isfinite(time)):
             return int(distance.argmin())
-        raise KeyError(f"{time} h: not a reported time; {self._rows_beside(time)}")
+        return None
 
     def _rows_beside(self, time: float) -> str:
         """Say which rows exist: all times, or the nearest ones before and after a time (h)."""
@@ -162,20 +199,189 @@ class Results(Mapping[str, np.ndarray]):
                 f"{self.time[-1]:.6g} h")
 
     @typed
-    def plot(self, name: str | None = None, *, time: float | str | None = None,
-             ax: Any = None) -> Any:
-        r"""Draw the run with matplotlib: curves over time, one column, or a field.
+    def probe(self, name: str, x: float | str, y: float | str) -> np.ndarray:
+        """Return a field at a place at all reported times.
+
+        Parameters
+        ----------
+        name : str
+            A field, with its unit or without.
+        x, y : float or str
+            Coordinates, um, or texts with a unit: x from the middle of the pore, y from its lower
+            wall.
+
+        Returns
+        -------
+        (rows,) or (rows, 3) array
+            Values in the unit of the field's name. NaN where the field has none, as of the
+            aggregate in the fluid, and where the place is beside the meshed part.
+
+        Raises
+        ------
+        KeyError
+            If the run has no field of this name.
+        ValueError
+            If the place is outside the pore.
+
+        Examples
+        --------
+        >>> import repro
+        >>> results = repro.solve("base", {"growth.end": "0.4 h"})
+        >>> results.probe("acceptor", x=0, y="20 um").round(1).tolist()
+        [9.9, 9.9, 9.9]
+        """
+        place = np.array([[self._coordinate("x", x), self._coordinate("y", y)]])
+        values = [sampling.sample(fields, self._field(name, fields), place)[0]
+                  for fields in map(self.fields, self.time)]
+        return np.array(values)
+
+    @typed
+    def profile(self, name: str, *, time: float | str, x: float | str | None = None,
+                y: float | str | None = None, points: int = 201) -> tuple[np.ndarray, np.ndarray]:
+        """Return a field along a line across the pore, or along it, at a time.
+
+        Parameters
+        ----------
+        name : str
+            A field, with its unit or without.
+        time : float or str
+            Hours, or a text with a unit, as for :meth:`fields`.
+        x, y : float or str, optional
+            One of them, um or a text with a unit: the place of a line from wall to wall, or the
+            height of one over the meshed part.
+        points : int, optional
+            Number of points.
+
+        Returns
+        -------
+        coordinate : (points,) array
+            The other coordinate, um.
+        values : (points,) or (points, 3) array
+            Values in the unit of the field's name; NaN where the field has none.
+
+        Raises
+        ------
+        KeyError
+            If the run has no field of this name, or no state at this time.
+        ValueError
+            If not one of x and y is given, or if it is outside the pore.
+
+        Examples
+        --------
+        >>> import repro
+        >>> results = repro.solve("base", {"growth.end": "0.4 h"})
+        >>> x, acceptor = results.profile("acceptor", y="20 um", time=0.4)
+        >>> len(x), bool(acceptor[0] > acceptor[-1])
+        (201, True)
+        """
+        if (x is None) == (y is None) or points < 2:
+            raise ValueError("profile: one of x and y, and two points or more, are needed")
+        fields = self.fields(time)
+        (left, low), (right, high) = drawing.corners(fields)
+        if x is not None:
+            along = np.linspace(low, high, points)
+            places = np.column_stack([np.full(points, self._coordinate("x", x)), along])
+        else:
+            along = np.linspace(left, right, points)
+            places = np.column_stack([along, np.full(points, self._coordinate("y", y))])
+        return along, sampling.sample(fields, self._field(name, fields), places)
+
+    def _coordinate(self, axis: str, value: float | str) -> float:
+        """Return a coordinate, um. Raises ValueError if it is outside the pore."""
+        try:
+            place = to_internal(value, "um") if isinstance(value, str) else value
+        except (ValueError, OverflowError):
+            raise ValueError(f'{axis}: {value!r}: a number of um or a text such as "20 um" is '
+                             "needed") from None
+        pore = self.tables.get("pore", {})
+        length, width = (to_internal(pore[key], "um") if key in pore else np.inf
+                         for key in ("length", "width"))
+        low, high = (-length / 2, length / 2) if axis == "x" else (0.0, width)
+        if not low <= place <= high:
+            raise ValueError(f"{axis}: {place:g} um is outside the pore, from {low:g} to {high:g} "
+                             "um")
+        return place
+
+    @typed
+    def outline(self, time: float | str, body: str | int | None = None) -> Outline:
+        """Return the boundary of an aggregate at a time, as :meth:`fields` takes it.
+
+        Parameters
+        ----------
+        time : float or str
+            Hours, or a text with a unit.
+        body : str or int, optional
+            Name of the aggregate, or its number from 1; needed if there are several.
+
+        Returns
+        -------
+        Outline
+            NumPy reads it as an (n, 2) array in um, from the upstream end on the wall of the
+            aggregate to the downstream one. ``to_shapely`` returns the area inside.
+
+        Raises
+        ------
+        KeyError
+            If the aggregate is not in the pore at this time, or as for :meth:`fields`.
+        ValueError
+            If there are several aggregates and none of them is named.
+
+        Examples
+        --------
+        >>> import numpy as np, repro
+        >>> outline = repro.solve("base", {"growth.end": "0.4 h"}).outline("24 min")
+        >>> round(float(np.asarray(outline)[:, 1].max()), 2)
+        5.19
+        """
+        numbers = self._bodies
+        chosen = next(iter(numbers), "1") if body is None and len(numbers) < 2 else str(body)
+        if chosen not in (*numbers, *map(str, range(1, len(numbers) + 1)), "1"):
+            raise ValueError(f"body: one of {', '.join(numbers)} is needed, not {body!r}")
+        number = list(numbers).index(chosen) + 1 if chosen in numbers else int(chosen)
+        upper = "upper" in list(numbers.values())[number - 1:number]
+        return outlines.outline(self.fields(time), number, upper, _hours(time))
+
+    @property
+    def _bodies(self) -> dict[str, str]:
+        """The wall of each aggregate of the scene by its name, or by its number from 1."""
+        part: Any = self.tables.get(bodies.SECTION, [])
+        seeds = [part] if isinstance(part, dict) else part
+        labels = bodies.labels([seed.get("name") for seed in seeds])
+        return {label: seed.get("wall", "lower") for label, seed in zip(labels, seeds)}
+
+    @typed
+    def plot(self, name: str | None = None, *, time: float | str | Sequence | None = None,
+             ax: Any = None, log: bool | None = None, unit: str | None = None,
+             title: str | None = None, cmap: str | None = None, image: Any = None,
+             um_per_pixel: float | None = None, corner: Sequence | None = None) -> Any:
+        r"""Draw the run with matplotlib: curves over time, one column, a field, or outlines.
 
         Parameters
         ----------
         name : str, optional
-            A column or a field, with its unit or without. By default, the curves of conductivity,
-            thickness and effluents are drawn that the scene has.
-        time : float or str, optional
-            Reported time of the field: hours, or a text with a unit. By default it is the last one.
+            A column or a field, with its unit or without, or "outlines". By default, the curves of
+            conductivity, thickness and effluents are drawn that the scene has.
+        time : float, str or list of these, optional
+            Time of the field, or times of the outlines: hours, or texts with a unit. By default it
+            is the last row, and for outlines ten rows or fewer at equal intervals.
         ax : matplotlib.axes.Axes or list of these, optional
             Axes to draw in, by default those of a new figure. Curves need as many as they have
             panels.
+        log : bool, optional
+            Show the quantity on a logarithmic scale. By default, a curve has one if it is positive
+            and spans two decades.
+        unit : str, optional
+            The unit of the quantity, such as "cm/s", or of the places of outlines.
+        title, cmap : str, optional
+            The title of the picture, and the name of matplotlib's map of colours.
+        image : str, Path or array, optional
+            A microscope image under outlines: its file, or its pixels (rows, columns), whose unit
+            of length is ``um_per_pixel``.
+        um_per_pixel : float, optional
+            Scale of the image, um; needed with it.
+        corner : (x, y), optional
+            Place of the image's lower left corner, um. By default, the middle of its lower edge is
+            at x = y = 0, the middle of the lower wall.
 
         Returns
         -------
@@ -187,33 +393,81 @@ class Results(Mapping[str, np.ndarray]):
         ImportError
             If matplotlib is not installed; names the extra to install.
         KeyError
-            If the run has no column and no field of this name, or no row at this time: names the
-            rows beside it.
+            If the run has no column and no field of this name, or no state at this time.
         ValueError
-            If a time is given without a field, a text is not a time, or ``ax`` has another number
-            of axes.
+            If a time is given without a field, a text is not a time, a unit is not one of the
+            quantity, or ``ax`` has another number of axes.
 
         Examples
         --------
         >>> import repro
-        >>> results = repro.solve("base", ['growth.end="1 h"'])
+        >>> results = repro.solve("base", {"growth.end": "1 h"})
         >>> [panel.get_ylabel() for panel in results.plot()]
         ['conductivity\n(m/day)', 'thickness\n(um)', 'effluent\n(mg/L)']
         >>> results.plot("acceptor", time=0.6).get_title(loc="left")
         'base, t = 0.6 h: acceptor (mg/L)'
+        >>> results.plot("conductivity", unit="cm/s", log=True).get_ylabel()
+        'conductivity\n(cm/s)'
+        >>> len(results.plot("outlines", time=[0, "24 min", 1]).collections[-1].get_segments())
+        3
         """
-        row = len(self.time) - 1 if time is None else self._row(time)
+        style = Style(log, unit, title, cmap)
         column = drawing.full_name(name or "", list(self.columns))
+        if name != OUTLINES and (image is not None or um_per_pixel or corner):
+            raise ValueError(f'image, um_per_pixel, corner: "{OUTLINES}" are drawn over an image')
         if name is None or column:
             if time is not None:
                 raise ValueError(f"time: {column or 'a plot without a name'} is drawn over all "
                                  "times; the name of a field is needed")
+            if unit is not None and not column:
+                raise ValueError("unit: the name of a column is needed with it")
             panels: Sequence[Sequence[str]] = [(column,)] if column else self._panels()
-            axes = drawing.curves(self, panels, ax)
+            axes = drawing.curves(self, panels, ax, style)
             return axes[0] if column else axes
-        fields = self._fields[row] if row >= 0 else {}
-        title = drawing.heading(self, self.time[row]) if row >= 0 else ""
-        return drawing.field(fields, self._field(name, fields), title, ax)
+        if name == OUTLINES:
+            times = _evenly(self.time) if time is None else np.array(time, dtype=object)
+            under = _photograph(image, um_per_pixel, corner)
+            return self._plot_outlines(np.atleast_1d(times), ax, under, style)
+        if isinstance(time, Sequence) and not isinstance(time, str):
+            raise TypeError("plot: time: one time of a field is needed, not a list")
+        hours = (self.time[-1] if len(self.time) else 0.0) if time is None else _hours(time)
+        fields = self.fields(hours) if len(self.time) else {}
+        full_name = self._field(name, fields)
+        heading = title or drawing.heading(self, hours)
+        return drawing.field(fields, full_name, heading, ax, style=style)
+
+    def _plot_outlines(self, times: np.ndarray, ax: Any, photograph: Photograph | None,
+                       style: Style) -> Any:
+        """Draw the outlines of all aggregates at times."""
+        lines = []
+        for time in times:
+            present = np.unique(self.fields(time)["region"].round()).astype(int)
+            lines += [self.outline(time, int(number)) for number in present if number]
+        if not lines:
+            raise KeyError(f"{OUTLINES}: this run has no aggregate at these times")
+        box = drawing.corners(self.fields(times[-1]))
+        heading = style.title or self.name
+        return drawing.drawn_outlines(lines, heading, box, ax, photograph, style)
+
+    def drawable(self) -> dict[str, str]:
+        """Return what :meth:`plot` draws.
+
+        Returns
+        -------
+        dict of str
+            Words and unit of each column and field of the last row by name, and of "outlines".
+
+        Examples
+        --------
+        >>> import repro
+        >>> repro.solve("flow_only").drawable()["head_loss_cm"]
+        'head loss over the whole pore (cm)'
+        """
+        fields = self._fields[-1] if len(self._fields) else {}
+        known = [name for name in (*self.columns, *fields)
+                 if name not in (TIME, "places_um", "triangles")]
+        outlined = {OUTLINES: "outlines of the aggregates over time"} if self._bodies else {}
+        return {name: names.with_unit(name) for name in known} | outlined
 
     def _panels(self) -> list[tuple[str, ...]]:
         """Find the columns of each panel of curves. Raises KeyError if the scene has none."""
@@ -233,7 +487,8 @@ class Results(Mapping[str, np.ndarray]):
         return field
 
     @typed
-    def animate(self, name: str, file: str | Path, *, ax: Any = None) -> Any:
+    def animate(self, name: str, file: str | Path, *, ax: Any = None, log: bool | None = None,
+                unit: str | None = None, title: str | None = None, cmap: str | None = None) -> Any:
         """Write a field at all reported times as a film, with one scale of colours.
 
         Parameters
@@ -241,9 +496,11 @@ class Results(Mapping[str, np.ndarray]):
         name : str
             A field, with its unit or without.
         file : str or Path
-            File to write; it ends in .gif.
+            File to write; it ends in .gif, or in .mp4 where the program ffmpeg is installed.
         ax : matplotlib.axes.Axes, optional
             Axes to draw in, by default those of a new figure.
+        log, unit, title, cmap : optional
+            As for :meth:`plot`.
 
         Returns
         -------
@@ -253,7 +510,7 @@ class Results(Mapping[str, np.ndarray]):
         Raises
         ------
         ImportError
-            If matplotlib is not installed; names the extra to install.
+            If matplotlib, or ffmpeg for .mp4, is not installed; names what to install.
         KeyError
             If the run has no field of this name.
         ValueError
@@ -269,10 +526,11 @@ class Results(Mapping[str, np.ndarray]):
         >>> axes.get_title(loc="left")
         'base, t = 0.4 h: acceptor (mg/L)'
         """
-        if Path(file).suffix != ".gif":
-            raise ValueError(f"file: {file}: a file name that ends in .gif is needed")
+        if Path(file).suffix not in (".gif", ".mp4"):
+            raise ValueError(f"file: {file}: a file name that ends in .gif or .mp4 is needed")
         fields = self._fields[-1] if len(self.time) else {}
-        return drawing.film(self, self._field(name, fields), Path(file), ax)
+        style = Style(log, unit, title, cmap)
+        return drawing.film(self, self._field(name, fields), Path(file), ax, style)
 
     def to_pandas(self):
         """Return the columns as a ``pandas.DataFrame``.
@@ -299,31 +557,65 @@ class Results(Mapping[str, np.ndarray]):
                            units={name: unit(name) for name in self.columns})
         return frame
 
-    def to_xarray(self):
-        """Return the columns as an ``xarray.Dataset``.
+    @typed
+    def to_xarray(self, fields: Sequence[str] = (), *, across: int = 51):
+        """Return the columns, and fields on a regular grid, as an ``xarray.Dataset``.
+
+        Parameters
+        ----------
+        fields : sequence of str, optional
+            Fields, with their units or without.
+        across : int, optional
+            Number of points over the width of the pore; the grid is equally fine along it.
 
         Returns
         -------
         xarray.Dataset
-            Variables over ``time_h``, each with its ``units`` and its ``long_name``.
+            Variables over ``time_h``, and fields over ``time_h``, ``y_um`` and ``x_um``, vectors
+            over ``axis``, too. Each has its ``units`` and its ``long_name``. Fields are NaN where
+            they have no value, and beside the meshed part of a time.
 
         Raises
         ------
         ImportError
             If xarray is not installed.
+        KeyError
+            If the run has no field of a name.
 
         Examples
         --------
         >>> import repro
         >>> repro.solve("flow_only").to_xarray()["head_loss_cm"].attrs["units"]
         'cm'
+        >>> repro.solve("flow_only").to_xarray(["velocity"])["velocity_m_per_d"].dims
+        ('time_h', 'y_um', 'x_um', 'axis')
         """
         attributes = {name: {"units": names.udunits(name), "long_name": names.words(name)}
                 for name in self.columns}
         columns = {name: (TIME, values, attributes[name]) for name, values in self.columns.items()}
         times = {TIME: columns.pop(TIME)}
         about = {"scene": self.name, "status": self.status}
-        return package("xarray").Dataset(columns, times, about)
+        dataset = package("xarray").Dataset(columns, times, about)
+        return dataset.assign(self._gridded(fields, across)) if len(fields) else dataset
+
+    def _gridded(self, fields: Sequence[str], across: int) -> dict[str, Any]:
+        """Fields of all rows on a regular grid, by name, as ``xarray.DataArray``s."""
+        rows = [self.fields(time) for time in self.time]
+        full_names = [self._field(name, rows[0] if rows else {}) for name in fields]
+        boxes = np.array([drawing.corners(each) for each in rows])
+        box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        x, y = sampling.grid(box, across)
+        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        coordinates = {TIME: self.time, "y_um": y, "x_um": x, "axis": ["x", "y", "z"]}
+        gridded = {}
+        for name in full_names:
+            values = np.array([sampling.sample(each, name, places) for each in rows])
+            values = values.reshape(len(rows), len(y), len(x), *values.shape[2:])
+            dims = list(coordinates)[:values.ndim]
+            gridded[name] = package("xarray").DataArray(
+                values, {dim: coordinates[dim] for dim in dims}, dims,
+                attrs={"units": names.udunits(name), "long_name": names.words(name)})
+        return gridded
 
     @typed
     def to_netcdf(self, file: str | Path) -> None:
@@ -395,6 +687,24 @@ def _hours(time: float | str) -> float:
                          "needed") from None
 
 
+def _evenly(times: np.ndarray) -> np.ndarray:
+    """Return the times nearest to MOST_OUTLINES equal intervals."""
+    wanted = np.linspace(times[0], times[-1], MOST_OUTLINES) if len(times) else times
+    return times[np.unique(np.abs(times - wanted[:, None]).argmin(axis=1))] if len(times) else times
+
+
+def _photograph(image: Any, um_per_pixel: float | None,
+                corner: Sequence | None) -> Photograph | None:
+    """Return the image under outlines. Raises ValueError if it lacks its scale."""
+    if image is None and um_per_pixel is None and corner is None:
+        return None
+    if image is None or not (um_per_pixel and um_per_pixel > 0):
+        raise ValueError("um_per_pixel: a number greater than zero is needed with an image")
+    if corner is not None and len(corner) != 2:
+        raise ValueError(f"corner: a place (x, y) in um is needed, not {corner!r}")
+    return Photograph(image, um_per_pixel, corner)
+
+
 def _html_row(head: str, values: np.ndarray) -> str:
     cells = "".join(f"<td>{value:.4g}</td>" for value in values)
     return f"<tr><th>{escape(head)}</th>{cells}</tr>"
@@ -409,7 +719,7 @@ def package(name: str):
 
 
 @typed
-def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+def solve(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
           scheme: Scheme | None = None, progress: bool = False) -> Results:
     """Run a scene and keep its rows and fields in memory.
 
@@ -417,8 +727,8 @@ def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
     ----------
     scene : Scene, str, path or dict
         A loaded scene, a packaged name, a file, or a dict of tables.
-    overrides : sequence of str
-        Texts "KEY=VALUE" that set keys of the scene.
+    overrides : sequence of str or dict, optional
+        Changes of the scene, as for :func:`repro.load_scene`.
     unset : sequence of str
         Keys to leave out.
     scheme : repro.schemes.Scheme, optional
@@ -451,17 +761,35 @@ def solve(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] 
     duration = scene.growth.end if scene.growth else 0.0
     rows = []
     fields = []
+    states = []
     status = "completed"
+
+    def reported() -> Iterator[tuple[RestartState, Report | None]]:
+        for state, report in steps(scene):
+            if report:
+                states.append(state)
+            yield state, report
+
+    def rerun(time: float) -> dict[str, np.ndarray]:
+        earlier = [state for state in states if state.time <= time]
+        return fields_at(scene, earlier[-1] if earlier else None, time)
+
     with progress_bar(progress, "h") as show:
         try:
-            for instant in simulate(scene):
+            for instant in reports(reported()):
                 rows.append(results.row(scene, instant))
                 fields.append(arrays(results.fields(scene, instant.pore, instant.solved)))
                 show(instant.pore.time, duration)
         except RunEnd as end:
             status = str(end)
     return Results(scene.name, rows, fields, status, tables=scene_tables(scene),
-                   provenance=results.provenance(scene))
+                   provenance=results.provenance(scene), rerun=rerun)
+
+
+def fields_at(scene: Scene, state: RestartState | None, time: float) -> dict[str, np.ndarray]:
+    """Return the fields of a row at a time (h), computed from an earlier state of the run."""
+    report = report_at(scene, state, time)
+    return arrays(results.fields(scene, report.pore, report.solved))
 
 
 def arrays(content: Grid) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import chain
@@ -129,7 +129,7 @@ def run(scene: Source, folder: str | Path, watch: Watch = DEFAULT_WATCH, *, forc
         return _continue(recorder, record, watch)
 
 
-def origin_of(scene: str | Path, overrides: Sequence[str], unset: Sequence[str]) -> dict:
+def origin_of(scene: str | Path, overrides: Collection[str], unset: Sequence[str]) -> dict:
     """Describe the origin of a scene for ``run.json``: a packaged name or a path, and changes."""
     file = scene if scene in packaged_scenes() else os.path.abspath(scene)
     return {"file": file, "set": list(overrides), "unset": list(unset)}
@@ -174,7 +174,7 @@ def _text(value: object) -> str:
     return "not set" if value is None else str(value)
 
 
-def resume(folder: str | Path, overrides: Sequence[str] = (),
+def resume(folder: str | Path, overrides: Collection[str] = (),
            watch: Watch = DEFAULT_WATCH) -> str:
     """Resume the run in a folder, or make it longer; returns how it ended.
 
@@ -198,7 +198,7 @@ def resume(folder: str | Path, overrides: Sequence[str] = (),
         return _extend(recorder, extended, overrides, record, watch)
 
 
-def _extended_scene(scene: Scene, overrides: Sequence[str], file: str) -> Scene:
+def _extended_scene(scene: Scene, overrides: Collection[str], file: str) -> Scene:
     """Return the scene with a later end. Raises SceneError for any other change."""
     if not overrides:
         return scene
@@ -217,7 +217,7 @@ def _extended_scene(scene: Scene, overrides: Sequence[str], file: str) -> Scene:
     return extended
 
 
-def _extend(recorder: Recorder, extended: Scene, overrides: Sequence[str], record: dict,
+def _extend(recorder: Recorder, extended: Scene, overrides: Collection[str], record: dict,
             watch: Watch) -> str:
     """Continue the run of this ``run.json`` to a later end; return how it ended."""
     earlier = [entry for entry in recorder.origin.get("set", []) if key_of(entry) != END]

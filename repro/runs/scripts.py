@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from repro.errors import OutputError
+from repro.errors import CheckpointError, OutputError
+from repro.march.state import RestartState
 from repro.report import fields, reading
-from repro.results import field_files
+from repro.results import field_files, provenance
 from repro.results.files import sha256_of
-from repro.results.tables import Results, arrays
-from repro.runs import execution
+from repro.results.tables import Results, arrays, fields_at
+from repro.runs import checkpoint, execution
 from repro.runs.execution import Watch, issue_warnings, origin_of
-from repro.runs.folder import read_sums
-from repro.scene import Source, load_scene
-from repro.scene.arguments import typed
+from repro.runs.folder import PROVENANCE, read_sums
+from repro.runs.machine import conditions
+from repro.runs.state_arrays import unpack_state
+from repro.scene import Scene, Source, load_scene, parse_scene
+from repro.scene.arguments import Overrides, typed
 from repro.timing import progress_bar
 
 
 @typed
-def run(scene: Source, folder: str | Path, overrides: Sequence[str] = (), *,
+def run(scene: Source, folder: str | Path, overrides: Overrides = (), *,
         unset: Sequence[str] = (), force: bool = False, progress: bool = False) -> Results:
     """Run a scene and write its results to a folder.
 
@@ -36,8 +41,8 @@ def run(scene: Source, folder: str | Path, overrides: Sequence[str] = (), *,
         A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
     folder : str or Path
         Folder for the results. It is created if it does not exist.
-    overrides : sequence of str, optional
-        Changes of the scene, such as ``['growth.end="5 h"']``.
+    overrides : sequence of str or dict, optional
+        Changes of the scene, such as ``{"growth.end": "5 h"}``.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
     force : bool, optional
@@ -79,7 +84,7 @@ def run(scene: Source, folder: str | Path, overrides: Sequence[str] = (), *,
 
 
 @typed
-def resume(folder: str | Path, overrides: Sequence[str] = (), *,
+def resume(folder: str | Path, overrides: Overrides = (), *,
            progress: bool = False) -> Results:
     """Resume a run that was interrupted, was killed or has failed, or make a run longer.
 
@@ -90,8 +95,8 @@ def resume(folder: str | Path, overrides: Sequence[str] = (), *,
     ----------
     folder : str or Path
         Folder of the run.
-    overrides : sequence of str, optional
-        A later end, such as ``['growth.end="30 h"']``. No other key can be changed. The longer run
+    overrides : sequence of str or dict, optional
+        A later end, such as ``{"growth.end": "30 h"}``. No other key can be changed. The longer run
         equals a run that had this end from its start.
     progress : bool, optional
         Show a bar of the simulated time (h), by ``tqdm.auto``.
@@ -181,7 +186,27 @@ def load_run(folder: str | Path) -> Results:
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed_fields)
     return Results(run.record["scene"], rows, files, run.record["status"], Path(folder),
-                   run.record["tables"], run.record)
+                   run.record["tables"], run.record, partial(_rerun, run))
+
+
+def _rerun(run: reading.Run, time: float) -> dict[str, np.ndarray]:
+    """Compute the fields at a time (h) from the last saved state before it, or from t = 0."""
+    record = run.record
+    scene = parse_scene(record["tables"], record["scene"], str(run.folder / PROVENANCE))
+    current = provenance(scene)["versions"], conditions()["source"]
+    if (record["versions"], record["conditions"]["source"]) != current:
+        warnings.warn(f"{run.folder}: code or packages have changed since the run: the fields at "
+                      f"{time:g} h may differ from those of its rows", stacklevel=4)
+    states = [state for name in (checkpoint.LAST, *checkpoint.STATES)
+              for state in _saved_states(scene, run.folder / name) if state.time <= time]
+    return fields_at(scene, max(states, key=lambda state: state.time, default=None), time)
+
+
+def _saved_states(scene: Scene, path: Path) -> Iterator[RestartState]:
+    """The state in a file, unless it is absent, damaged or of another version or scene."""
+    with suppress(CheckpointError):
+        plain, saved = checkpoint.read_checkpoint(path)
+        yield unpack_state(scene, plain["state"], saved)
 
 
 def _none_if_nan(value: float) -> float | None:

@@ -9,9 +9,12 @@ from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from repro.scene.units import without_numpy
+from repro.scene.reading import assignments
+from repro.scene.units import plain
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+#: Changes of a scene: texts KEY=VALUE, or a dict of values by dotted keys.
+Overrides = Sequence[str] | dict[str, Any]
 #: Kinds of numbers that an annotation stands for, NumPy's among them.
 NUMBERS: dict[object, type] = {float: Real, int: Integral}
 #: Characters of a refused value in a message.
@@ -21,20 +24,25 @@ LONGEST_VALUE = 60
 def typed(function: Function) -> Function:
     """Check the types of arguments by the annotations of their parameters.
 
-    An array of NumPy is accepted as a list. The decorated function raises TypeError, in one line,
-    for the first argument of a wrong type.
+    An array of NumPy is accepted as a list, and a dict of overrides becomes a list of texts. The
+    decorated function raises TypeError, in one line, for the first argument of a wrong type.
     """
     parameters = tuple(inspect.signature(function).parameters)
     hints = cache(lambda: get_type_hints(function))
 
     def checked(name: str, value: object) -> object:
+        if hints().get(name) == Overrides and isinstance(value, dict):
+            try:
+                return assignments(value)
+            except TypeError as error:
+                raise TypeError(f"{function.__name__}: {name}: {error}") from None
         if name not in hints() or _accepts(hints()[name], value):
             return value
-        plain = without_numpy(value)
-        if plain is value or not _accepts(hints()[name], plain):
+        converted = plain(value)
+        if converted is value or not _accepts(hints()[name], converted):
             kinds = _words(hints()[name])
             raise TypeError(f"{function.__name__}: {name}: {kinds} is needed, not {_short(value)}")
-        return plain
+        return converted
 
     @wraps(function)
     def call(*arguments, **keywords):

@@ -78,12 +78,22 @@ def read_tables(file: str) -> dict:
         raise SceneError(f"{file}: a key of more than {MOST_PARTS} parts (at line {deep}); "
                          "one of a scene has at most 3, such as substrates.donor.supply")
     try:
-        return tomllib.loads(text)
+        return _beside(tomllib.loads(text), Path(file).parent)
     except RecursionError:
         raise SceneError(f"{file}: not TOML: values nested too deeply; "
                          "a scene has tables of plain values") from None
     except ValueError as error:
         raise SceneError(f"{file}: not TOML: {error}{_line_of(text, str(error))}") from None
+
+
+def _beside(tables: dict, folder: Path) -> dict:
+    """Tables whose files of outlines are beside the file of the scene."""
+    part = tables.get(bodies.SECTION)
+    for seed in part if isinstance(part, list) else [part]:
+        drawn = seed.get("outline") if isinstance(seed, dict) else None
+        if isinstance(drawn, dict) and isinstance(drawn.get("file"), str):
+            drawn["file"] = str(folder / drawn["file"])
+    return tables
 
 
 def line_of_a_deep_key(text: str) -> int:

@@ -10,7 +10,7 @@ and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguit
 """
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from copy import deepcopy
 from dataclasses import MISSING, asdict, dataclass, field, replace
 from fractions import Fraction
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from repro.scene import bodies
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
@@ -39,8 +39,10 @@ from repro.scene.units import (
     UP_TO_1,
     UP_TO_20,
     WORD,
+    Drawn,
     Flag,
     Points,
+    Refused,
     SceneError,
     Stated,
     Times,
@@ -67,7 +69,10 @@ RATIO = 1.52  # F, mg/mg, Table 1
 
 @dataclass(frozen=True)
 class Pore:
-    """The channel `0 <= y <= width` (um), or the half of one below a plane of symmetry."""
+    """The channel `0 <= y <= width` (um), or the half of one below a plane of symmetry.
+
+    `depth` (um) is that of the whole pore, across the plane; the model is plane.
+    """
 
     width: float = quantity("100 um", "um", PORE_WIDTH, about="W_pore, from wall to wall",
                             source="Table 1 (typically 100 um; 50 um in section 4)")
@@ -76,6 +81,15 @@ class Pore:
         "no slip", "symmetry", source=NOT_IN_PAPER,
         about="The upper wall: like the lower one, or the middle of a pore of twice the width, "
               "with the mirror image of the aggregate beyond it")
+    depth: float | None = quantity(
+        "10 um", "um", default=None, source=NOT_IN_PAPER,
+        about="Depth across the plane, for flow.rate and for columns of totals; results per depth "
+              "do not need it")
+
+    @property
+    def whole_width(self) -> float:
+        """Width (um), with its mirror image beyond a plane of symmetry."""
+        return self.width * (2.0 if self.upper_wall == "symmetry" else 1.0)
 
 
 @dataclass(frozen=True)
@@ -130,17 +144,21 @@ class Aggregate:
 class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
-    The other one is None. A table of the scene is a TimeTable here, and a number in the scene that
-    `Scene.at` returns. The aggregate has a `viscosity_ratio` or a `permeability` (um^2); the other
-    one is None.
+    The other one is None; a `rate` (um^3/h) gives the mean velocity. A table of the scene is a
+    TimeTable here, and a number in the scene that `Scene.at` returns. The aggregate has a
+    `viscosity_ratio` or a `permeability` (um^2); the other one is None.
     """
 
     head: float | None = timed_quantity(
         "1e-3 cm", "um", default=None, source="(6), section 4",
-        about="Head lost over the whole pore; either this or mean_velocity")
+        about="Head lost over the whole pore; either this, mean_velocity or rate")
     mean_velocity: float | None = timed_quantity(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
-        about="u_ave, mean over the width; either this or head")
+        about="u_ave, mean over the width; either this, head or rate")
+    rate: float | None = timed_quantity(
+        "0.1 uL/min", "um^3/h", NON_NEGATIVE, default=None, source=NOT_IN_PAPER,
+        about="Flow through the whole pore, of width and pore.depth, with the mirror image beyond "
+              "a plane of symmetry; either this, head or mean_velocity")
     viscosity_ratio: float | None = number(
         LAMBDA, source="2.1, Table 1", stated="default 2000 without permeability",
         default=None, about="lambda, viscosity of the aggregate over that of water")
@@ -449,7 +467,7 @@ class Output:
         about="Times of the requested rows and fields; they change no step. Without it: every "
         "step, with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are "
         "24 rows or more after t = 0")
-    every: float | None = quantity(
+    every: float = quantity(
         "1 h", "h", default=None, source=NOT_IN_PAPER,
         about="Interval of rows and fields from t = 0 on, with a last one at growth.end; times "
         "adds others")
@@ -570,7 +588,7 @@ class Scene:
         """Whether there are substrates without flow, at any time."""
         if self.substrates is None or self.flow is None:
             return self.substrates is not None
-        velocity = self.flow.mean_velocity
+        velocity = self.flow.mean_velocity if self.flow.rate is None else self.flow.rate
         return 0 in velocity.values if isinstance(velocity, TimeTable) else velocity == 0
 
     @cached_property
@@ -591,6 +609,10 @@ class Scene:
     def requested_times(self) -> tuple[float, ...] | None:
         """The times (h) of rows by [output], ascending; None: every step."""
         return self.output.requested(self.growth.end if self.growth else 0.0)
+
+    def reporting(self, time: float) -> "Scene":
+        """Return the scene with a row at a time (h) alone."""
+        return replace(self, output=replace(self.output, every=None, times=(time,)))
 
     def corner(self, time: float) -> float:
         """Return the next time (h) of its tables after ``time``; infinite if there is none."""
@@ -638,7 +660,7 @@ KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among t
 
 
 @typed
-def load_scene(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[str] = (),
+def load_scene(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
                scheme: Scheme | None = None) -> Scene:
     """Load a scene, with changes.
 
@@ -647,8 +669,9 @@ def load_scene(scene: Source, overrides: Sequence[str] = (), *, unset: Sequence[
     scene : Scene, str, Path or dict
         A TOML file, the name of a packaged scene, a dict of tables like those of a file, or a
         loaded scene. Lists of a dict may be tuples or arrays, its numbers scalars of NumPy.
-    overrides : sequence of str, optional
-        Changes "KEY=VALUE", like those of ``--set``: dotted keys, values in TOML with units.
+    overrides : sequence of str or dict, optional
+        Changes: texts "KEY=VALUE", like those of ``--set``, with values in TOML with units; or a
+        dict of values by dotted keys, among them values of NumPy and quantities of pint.
     unset : sequence of str, optional
         Dotted keys or sections to leave out, like those of ``--unset``; before ``overrides``.
     scheme : repro.schemes.Scheme, optional
@@ -690,7 +713,7 @@ def label(source: Source) -> str:
     return "scene" if isinstance(source, dict) else str(source)
 
 
-def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> dict:
+def load_tables(source: Source, overrides: Collection[str] = (), unset: Sequence[str] = ()) -> dict:
     """Load the tables of a scene without checks, and apply --unset and then --set."""
     file = label(source)
     if isinstance(source, Scene):
@@ -724,12 +747,48 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
                        units=units_of(tables))
     if scheme is not None and scheme != scene.numerics.scheme:
         scene = replace(scene, numerics=replace(scene.numerics, exchanged=scheme))
+    scene = _with_files(scene, file)
     for broken, requirement in rules(scene):
         if broken:
             key = _to_name(list(requirement), tables, changed)
             value = _at(tables, key, _at(scene_tables(scene), key, MISSING))
             raise Place(file, key).refuse(value, requirement[key])
-    return scene
+    return _with_velocity(scene)
+
+
+def _with_velocity(scene: Scene) -> Scene:
+    """Return the scene with the mean velocity (um/h) of its flow rate."""
+    if scene.flow is None or scene.flow.rate is None:
+        return scene
+    area = scene.pore.whole_width * scene.pore.depth
+    rate = scene.flow.rate
+    velocity = rate / area if not isinstance(rate, TimeTable) else replace(
+        rate, values=tuple(value / area for value in rate.values))
+    return replace(scene, flow=replace(scene.flow, mean_velocity=velocity))
+
+
+def _as_given(scene: Scene) -> Scene:
+    """Return the scene without the mean velocity of its flow rate."""
+    if scene.flow is None or scene.flow.rate is None:
+        return scene
+    return replace(scene, flow=replace(scene.flow, mean_velocity=None))
+
+
+def _with_files(scene: Scene, file: str) -> Scene:
+    """Read the outlines that are files. Raises SceneError, naming the scene's ``file``."""
+    seeds = []
+    for place, seed in zip(scene.places, scene.aggregates):
+        if isinstance(seed.outline, Drawn):
+            from repro.scene.drawn import points_of  # a scene without files does not load it
+
+            try:
+                points = points_of(seed.outline, seed.wall, scene.pore.width)
+            except Refused as error:
+                key = Place(file, f"{place}.outline")
+                raise key.refuse(asdict(seed.outline), str(error)) from None
+            seed = replace(seed, outline=points)
+        seeds.append(seed)
+    return replace(scene, aggregates=tuple(seeds))
 
 
 def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
@@ -774,7 +833,7 @@ def scene_tables(scene: Scene) -> dict:
 
     `parse_scene` reads them back as an equal scene, bit by bit.
     """
-    return write_table(scene, scene.units)
+    return write_table(_as_given(scene), scene.units)
 
 
 def scene_hash(scene: Scene) -> str:
@@ -783,7 +842,7 @@ def scene_hash(scene: Scene) -> str:
     A key of `LATER` counts if it differs from its default, and a scene counts as earlier versions
     wrote it, so that recorded hashes stay valid. A scheme counts if it is not that of the preset.
     """
-    written = with_former(write_table(scene))
+    written = with_former(write_table(_as_given(scene)))
     tables = {key: _without_later(key, table) for key, table in written.items()}
     if scene.numerics.exchanged is not None:
         tables["scheme"] = asdict(scene.numerics.exchanged)

@@ -16,7 +16,7 @@ from repro.scene.units import (
     as_list,
     because,
     nearest,
-    without_numpy,
+    plain,
 )
 
 LONGEST_KEY = 60  # characters of a key in a message
@@ -35,7 +35,7 @@ NOT_MODELLED = {
                    "glucose phenol"),
     "kinetics": ("one species of bacteria is modelled", "strain strains species"),
     "": ('"{word}" is not modelled',
-         "attachment detachment erosion sloughing depth dimension dimensions temperature inertia "
+         "attachment detachment erosion sloughing dimension dimensions temperature inertia "
          "turbulence precipitation maintenance quorum ph gas"),
 }
 
@@ -176,6 +176,33 @@ def toml(tables: dict, above: str = "") -> str:
     return _toml(tables, f"[{above[:-1]}]" if above else "", above)
 
 
+def toml_value(value: object) -> str:
+    """Write a value as TOML in one line, in ASCII. Raises TypeError for one that TOML lacks."""
+    value = plain(value)
+    if isinstance(value, dict):
+        parts = ", ".join(f"{key} = {toml_value(part)}" for key, part in value.items())
+        return f"{{ {parts} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if not isinstance(value, str | int | float):
+        raise TypeError(f"not {type(value).__name__}")
+    return json.dumps(value)
+
+
+def assignments(changes: dict) -> list[str]:
+    """Write a dict of changes as the texts KEY=VALUE of --set. Raises TypeError if one is none."""
+    texts = []
+    for key, value in changes.items():
+        if not isinstance(key, str):
+            raise TypeError(f"the key {quote(key)}: a text such as pore.width is needed")
+        try:
+            texts.append(f"{key}={toml_value(value)}")
+        except TypeError as error:
+            raise TypeError(f"{key}: a text with a unit, a number, true or false, a list, or a "
+                            f"value of NumPy or pint is needed, {error}") from None
+    return texts
+
+
 def _toml(tables: dict, head: str, above: str) -> str:
     lines = [head] if head else []
     inner = {key: value for key, value in tables.items() if isinstance(value, dict)
@@ -242,5 +269,5 @@ def quote(value: object, longest: int = 60) -> str:
 
 def _plain(value: object) -> object:
     """A value of another type than those of JSON, as a message shows it."""
-    plain = without_numpy(value)
-    return str(value) if plain is value else plain
+    converted = plain(value)
+    return str(value) if converted is value else converted

@@ -42,7 +42,7 @@ def rules(scene: "Scene") -> Rules:
         yield from _aggregate_rules(scene, place, aggregate)
     yield from _pair_rules(scene)
     if scene.flow:
-        yield from _flow_rules(scene, scene.flow.head, scene.flow.mean_velocity)
+        yield from _flow_rules(scene, scene.flow)
         yield from _biomass_rules(scene, scene.flow)
     if scene.substrates:
         yield from _boundary_rules(scene)
@@ -266,17 +266,23 @@ def nearest_edges(points: Outlined, width: float) -> list[tuple[int, int]]:
     return sorted(zip((first[near] + 1).tolist(), (second[near] + 1).tolist()))[:1]
 
 
-def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
+def _flow_rules(scene: "Scene", drive: "Flow") -> Rules:
     example = 'such as head = "1e-3 cm" or mean_velocity = "2.9 m/day"'
-    requirement = f"it or flow.mean_velocity is needed, {example}"
-    yield head is None and velocity is None, {"flow.head": requirement}
-    yield head is not None and velocity is not None, {
-        "flow.mean_velocity": _not_both("flow.head", _in_words(head, "um")),
-        "flow.head": _not_both("flow.mean_velocity", _in_words(velocity, "m/day", 24e-6)),
-    }
+    requirement = f"it, flow.mean_velocity or flow.rate is needed, {example}"
+    drives = {"flow.head": _in_words(drive.head, "um"),
+              "flow.mean_velocity": _in_words(drive.mean_velocity, "m/day", 24e-6),
+              "flow.rate": _in_words(drive.rate, "uL/min", 1e-9 / 60)}
+    yield not any(drives.values()), {"flow.head": requirement}
+    for one, other in combinations(drives, 2):
+        yield bool(drives[one] and drives[other]), {
+            other: _not_both(one, drives[one]), one: _not_both(other, drives[other])}
+    yield drive.rate is not None and scene.pore.depth is None, {
+        "flow.rate": "pore.depth is needed with it",
+        "pore.depth": "it is needed with flow.rate"}
+    still = "flow.mean_velocity" if drive.rate is None else "flow.rate"
     yield scene.stagnant and _steady(scene), {
-        "flow.mean_velocity": f"greater than zero is needed{_UNSTEADY}",
-        "numerics.transport": f'"gear" is needed with flow.mean_velocity = 0: {_NO_STATE}',
+        still: f"greater than zero is needed{_UNSTEADY}",
+        "numerics.transport": f'"gear" is needed with {still} = 0: {_NO_STATE}',
     }
 
 

@@ -7,7 +7,6 @@ space, so that they still change with the preset. All words come from the fields
 
 from __future__ import annotations
 
-import json
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, Field
@@ -23,7 +22,7 @@ from repro.scene import (
     parse_scene,
 )
 from repro.scene.files import key_of, read_text
-from repro.scene.reading import entries
+from repro.scene.reading import entries, toml_value
 from repro.scene.units import Choice, Flag, Number
 
 WIDTH = 100
@@ -83,7 +82,7 @@ def _table(path: str, entry: Field, written: dict, part: object,
             yield from _comment(_about(field))
             yield from _comment(f"{field.metadata['kind'].accepted}; {stated(kind, key, field)}")
             value = written[key] if key in written else _default(field, getattr(part, key, None))
-            yield f"{'' if key in written else '#'}{key} = {_toml(value)}"
+            yield f"{'' if key in written else '#'}{key} = {toml_value(value)}"
     for key, field in inner.items():
         yield from _table(f"{path}.{key}", field, written.get(key, {}), getattr(part, key, None))
 
@@ -105,8 +104,8 @@ def stated(kind: type, key: str, field: Field) -> str:
     presets = PRESETS.values() if kind is Numerics else []
     values = [preset.get(key, preset_default) for preset in presets]
     if set(values) <= {preset_default}:
-        return f"default {_toml(preset_default)}"
-    defaults = [f"{_toml(value)} ({preset})" for preset, value in zip(PRESETS, values)]
+        return f"default {toml_value(preset_default)}"
+    defaults = [f"{toml_value(value)} ({preset})" for preset, value in zip(PRESETS, values)]
     return "default " + ", ".join(defaults)
 
 
@@ -125,11 +124,3 @@ def _default(field: Field, value: object) -> object:
 def _comment(text: str) -> Iterator[str]:
     yield from textwrap.wrap(text, WIDTH, initial_indent="# ", subsequent_indent="# ",
                              break_on_hyphens=False)
-
-
-def _toml(value: object) -> str:
-    """A value as TOML writes it in one line, in ASCII."""
-    if isinstance(value, dict):
-        parts = ", ".join(f"{key} = {_toml(part)}" for key, part in value.items())
-        return f"{{ {parts} }}"
-    return json.dumps(value)

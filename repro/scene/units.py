@@ -32,6 +32,7 @@ NOUNS = {
     "h": "a time",
     "um^2": "a permeability",
     "um/h": "a velocity",
+    "um^3/h": "a flow rate",
     "um/h^2": "an acceleration",
     "um^2/h": "a diffusivity or kinematic viscosity",
     "1/h": "a rate",
@@ -109,13 +110,12 @@ class Quantity:
         return f'{NOUNS[self.unit]} is needed, such as "{self.example}" ({self.accepts.words})'
 
     def near(self, value: object) -> str:
-        """Suggest a plain number with the unit of the example, or the text of pint's quantity."""
+        """Suggest a plain number with the unit of the example."""
         endless = isinstance(value, int) and abs(value) >= 10**LONGEST
         if isinstance(value, bool) or endless:
             return ""
         plain = isinstance(value, Real | str) and re.fullmatch(_DIGITS, f"{value}")
         meant = f"{value} {self.usual_unit}" if plain else ""
-        meant = str(value) if hasattr(value, "units") else meant
         return f'"{meant}"' if _takes(self, meant) else ""
 
     def read(self, value: object) -> float:
@@ -257,6 +257,7 @@ class Number:
         return "" if match[2] and _has_dimensionless_factor(match[2]) else match[1]
 
     def read(self, value: object) -> float:
+        value = plain(value) if hasattr(value, "magnitude") else value
         if isinstance(value, bool) or not isinstance(value, Real):
             has_moles = isinstance(value, str) and _MOLES.search(value[:LONGEST])
             raise ValueError(NO_MOLES if has_moles else _fault(value))
@@ -352,20 +353,43 @@ class Times:
 
 
 @dataclass(frozen=True)
+class Drawn:
+    """A file with an outline, and um per unit of its coordinates or per pixel."""
+
+    file: str
+    um_per_unit: float
+
+
+@dataclass(frozen=True)
 class Points:
-    """A list of points (x, y), um, in their order."""
+    """A list of points (x, y), um, in their order, or a file with a polygon."""
 
     each = Quantity("um", "4 um", EITHER_SIGN)
     default: ClassVar[dict] = {"default": None}
     example = [["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]]
-    accepted = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
-    requirement = f"{accepted}, is needed, such as {json.dumps(example)}"
+    file = '{ file = "colony.geojson", um_per_unit = 1.0 }'
+    listed = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
+    accepted = (f"{listed}; or a file .geojson, .csv or .png with a polygon or a mask, such as "
+                f"{file}")
+    requirement = f"{listed}, is needed, such as {json.dumps(example)}, or a file, such as {file}"
+    scale = Number(1.0)
 
-    def read(self, value: object) -> tuple[tuple[float, float], ...]:
+    def read(self, value: object) -> tuple[tuple[float, float], ...] | Drawn:
+        if isinstance(value, dict):
+            return self._drawn(value)
         points = as_list(value)
         if points is None or not 3 <= len(points) <= MOST_POINTS:
             raise ValueError(_wrong_type(value))
         return tuple(_each("point", self._point, points))
+
+    def _drawn(self, value: dict) -> Drawn:
+        if value.keys() != {"file", "um_per_unit"} or not isinstance(value["file"], str):
+            raise ValueError("a file has the keys file and um_per_unit")
+        try:
+            return Drawn(value["file"], self.scale.read(value["um_per_unit"]))
+        except ValueError as error:
+            raise Refused("um_per_unit, the length of a unit or pixel in um, is a plain number "
+                          f"greater than zero{because(error)}") from None
 
     def _point(self, value: object) -> tuple[float, float]:
         pair = as_list(value)
@@ -510,6 +534,7 @@ def to_internal(value: object, unit: str) -> float:
 
 def _parts(value: object) -> tuple[str, str]:
     """Split a number with a unit into its digits and the unit. Raises ValueError for others."""
+    value = plain(value) if hasattr(value, "magnitude") else value
     text = value.translate(_PRINTED) if isinstance(value, str) and len(value) <= LONGEST else ""
     match = _QUANTITY.fullmatch(text)
     if match is None:
@@ -571,13 +596,27 @@ def _table_parts(value: object) -> tuple[object, list | None]:
 
 def as_list(value: object) -> list | None:
     """Return a list, a tuple or an array as a list; None for other values."""
-    plain = without_numpy(value)
-    return list(plain) if isinstance(plain, list | tuple) else None
+    listed = plain(value)
+    return list(listed) if isinstance(listed, list | tuple) else None
 
 
-def without_numpy(value):
-    """Return a scalar or an array of NumPy as a number or a list, and other values unchanged."""
+def plain(value):
+    """Return a value of NumPy or pint in the types of a TOML file, and other values unchanged.
+
+    An array is a list. A quantity, which has ``magnitude`` and ``units``, is a text such as
+    "50.0 micrometer", or a number if it is dimensionless.
+    """
+    if hasattr(value, "magnitude") and hasattr(value, "units"):
+        unit = str(value.units).replace(" ** ", "^")
+        return _with_unit(plain(value.magnitude), "" if unit == "dimensionless" else unit)
     return value.tolist() if type(value).__module__ == "numpy" else value
+
+
+def _with_unit(magnitude, unit: str):
+    """Return a magnitude, a number or a nested list of numbers, with its unit."""
+    if isinstance(magnitude, list):
+        return [_with_unit(each, unit) for each in magnitude]
+    return f"{float(magnitude)!r} {unit}" if unit else magnitude
 
 
 def _each(noun: str, read: Callable, values: list) -> Iterator:

@@ -34,8 +34,8 @@ from repro.scene.files import key_of, override
 from repro.scene.reading import quote
 
 MOST_POINTS = 10_000
-#: A scene has one key of each pair: varying it replaces the other.
-PAIRS = {"flow.head": "flow.mean_velocity", "flow.mean_velocity": "flow.head"}
+#: A scene has one of these keys: varying it replaces the others.
+DRIVES = ("flow.head", "flow.mean_velocity", "flow.rate")
 EXPECTED_FORM = ('KEY=a:b UNIT:linear|log:N or KEY=VALUE, VALUE, ... is needed, such as '
                  '"flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"')
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)", re.S)
@@ -226,24 +226,30 @@ def points(source: Source, sets: list[str], factors: list[Factor], combinations:
 def _check_keys(sets: list[str], varied: list[str]) -> None:
     """Raise SceneError if keys that are set and varied exclude each other."""
     for key, count in Counter(varied).items():
-        partner = PAIRS.get(key)
+        partners = _others(key)
         if count > 1:
             raise SceneError(f"--vary {key}: one --vary of it is accepted, with all its values")
-        if partner in varied:
+        for partner in set(partners) & set(varied):
             raise SceneError(f"--vary {key}: it and {partner} exclude each other; one of them is "
                              "accepted")
-        if any(other in (key, partner) for other in sets):
-            named = f"{key} or {partner}" if partner else key
+        if any(other in (key, *partners) for other in sets):
+            named = " or ".join((key, *partners))
             raise SceneError(f"--set of {named}: it is not accepted beside --vary {key}, which "
                              "replaces it")
+
+
+def _others(key: str) -> tuple[str, ...]:
+    """The keys that a varied one replaces."""
+    return tuple(other for other in DRIVES if other != key) if key in DRIVES else ()
 
 
 def _scene(source: str, tables: dict, factors: list[Factor], values: tuple,
            run_label: str) -> Scene:
     for factor, value in zip(factors, values):
-        section, _, key = PAIRS.get(factor.key, "").partition(".")
-        if isinstance(tables.get(section), dict):
-            tables[section].pop(key, None)
+        for other in _others(factor.key):
+            section, _, key = other.partition(".")
+            if isinstance(tables.get(section), dict):
+                tables[section].pop(key, None)
         override(tables, f"{factor.key}={factor.text(value)}", source, KEYS)
     try:
         return parse_scene(tables, Path(source).stem, source)

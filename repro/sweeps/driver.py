@@ -16,7 +16,7 @@ from repro.results.tables import package
 from repro.runs.folder import folder_errors
 from repro.runs.machine import refuse_exchanged, require_packages
 from repro.scene import SceneError, Source, label
-from repro.scene.arguments import typed
+from repro.scene.arguments import Overrides, typed
 from repro.sweeps import cluster, design, page, pool, table
 from repro.sweeps.folder import Sweep, SweepError, lock_folder
 from repro.timing import progress_bar
@@ -139,7 +139,7 @@ class Swept:
 
 
 @typed
-def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Sequence[str] = (), *,
+def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Overrides = (), *,
           unset: Sequence[str] = (), samples: int | None = None, seed: int = 0,
           workers: int | None = None, scheduler: str | None = None, clogged: float = CLOGGED,
           progress: bool = False, tell: Tell | None = None) -> Swept:
@@ -156,8 +156,8 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Seq
         or ``"pore.width=50 um, 60 um"``, as for ``repro sweep --vary``.
     folder : str or Path
         Folder for the runs, the tables and the page.
-    overrides : sequence of str, optional
-        Changes of the scene, such as ``"growth.end=5 h"``.
+    overrides : sequence of str or dict, optional
+        Changes of the scene, such as ``{"growth.end": "5 h"}``.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
     samples : int, optional

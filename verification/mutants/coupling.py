@@ -892,8 +892,8 @@ MUTANTS = (
         ("nearest-time-drawn",
          "plot draws the nearest row.",
          "Results.plot",
-         "len(self.time) - 1 if time is None else self._row(time)",
-         'len(self.time) - 1 if time is None else self._row(time, "nearest")',
+         "self.fields(hours) if len(self.time) else {}",
+         'self.fields(hours, "nearest") if len(self.time) else {}',
          "tests/test_drawing.py::test_the_command_refuses_in_one_line")),
     *changes(
         "repro/model/growth.py",
