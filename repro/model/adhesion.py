@@ -51,8 +51,8 @@ from repro.scene import Growth, Numerics, Scene, at_time, needed
 
 #: The length of the means, over the pore's width.
 LENGTH = 1 / 20
-#: Length of the means over that of the triangles beside contact lines. On bonded walls tractions err
-#: by 0.7, 0.5 and 0.35 % with 8, 11 and 16 of them (``growth-gold-bonded``).
+#: Length of the means over that of the triangles beside contact lines. On bonded walls tractions
+#: err by 0.7, 0.5 and 0.35 % with 8, 11 and 16 of them (``growth-gold-bonded``).
 ELEMENTS_ALONG = 8
 #: Parts of an arc on a wall, for the means of its traction.
 PARTS = 64
