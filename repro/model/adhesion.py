@@ -234,7 +234,7 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
     forces = None
     if loading.growth.has_fluid_forces:
         # The velocity of the solution: at a jump, the scene has the head after it alone.
-        driven = replace(at_time(needed(loading.drive, "[flow]"), pore.time), head=None,
+        driven = replace(at_time(needed(loading.drive, "[flow]"), pore.time),
                          mean_velocity=solved.mean_velocity)
         water = flow.solve(rest.space, driven, loading.length, interface=loading.interface)
         solved = replace(solved, flow=water)
