@@ -152,8 +152,7 @@ class BalanceError(StageError):
 
 
 class RunEnd(Exception):
-    """The model ends before ``growth.end``: Detachment, Fold, Meeting, PoreEnd or
-    Steady. It is no failure."""
+    """The model ends before ``growth.end``: an end of :mod:`repro.march.ends`. No failure."""
 
 
 class SimulationError(RuntimeError):

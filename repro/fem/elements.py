@@ -100,13 +100,6 @@ def vertex_table(order: int) -> Table:
     return _tabulated(order, nodes(1), np.full(3, 1 / 6))
 
 
-@cache
-def node_table(order: int) -> Table:
-    """Like :func:`table`, but at the nodes of the element, without weights."""
-    where = nodes(order)
-    return _tabulated(order, where, np.zeros(len(where)))
-
-
 def _tabulated(order: int, where: np.ndarray, weights: np.ndarray) -> Table:
     return Table(weights, *evaluated(order, where), values(1, where))
 

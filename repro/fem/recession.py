@@ -20,8 +20,12 @@ from repro.errors import ContactEroded, ErosionError
 from repro.fem.outline import ON_ARC, Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Walls
 
-#: An arc joins a neighbour if the receded surface keeps less than this part of its length.
-KEPT = 0.25
+#: An arc joins a neighbour if the receded surface keeps less than this part of one of its halves.
+#: The middle of an arc is then a third to two thirds along its chord; beyond a quarter it folds.
+KEPT = 0.5
+#: The middle of an arc moves along it to the middle of its chord if it is farther from that than
+#: this part of the chord.
+CENTRED = 0.1
 
 
 def normals(outline: Outline) -> np.ndarray:
@@ -59,7 +63,7 @@ def moved(outline: Outline, moves: np.ndarray) -> Outline:
     for number in np.unique(outline.wall[on]):
         surface = np.flatnonzero(outline.wall == number)
         points[surface, 0] = _between_lines(outline, surface, points[:, 0])
-    return replace(outline, points=points, origin=points.copy())
+    return _centred(replace(outline, points=points))
 
 
 def _between_lines(outline: Outline, surface: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -78,9 +82,10 @@ def _between_lines(outline: Outline, surface: np.ndarray, x: np.ndarray) -> np.n
 
 def merged(outline: Outline, moves: np.ndarray) -> Outline | None:
     """The outline without the arc that shrinks most under moves (M, 2) um, which joins the smoother
-    of its neighbours; None if all arcs keep KEPT of their length."""
-    before = _chords(outline.points)
-    kept = np.sum(before * _chords(outline.points + moves), axis=1) / np.sum(before**2, axis=1)
+    of its neighbours; None if all arcs keep KEPT of their halves."""
+    before = _halves(outline.points)
+    kept = np.sum(before * _halves(outline.points + moves), axis=1) / np.sum(before**2, axis=1)
+    kept = kept.reshape(-1, 2).min(axis=1)
     free = outline.edge_wall == FREE
     worst = int(np.argmin(np.where(free, kept, np.inf)))
     if kept[worst] >= KEPT:
@@ -94,9 +99,21 @@ def merged(outline: Outline, moves: np.ndarray) -> Outline | None:
     return _joined(outline, max(joints, key=lambda joint: turns[joint]))
 
 
-def _chords(points: np.ndarray) -> np.ndarray:
-    """(E, 2) um, from the start to the end of each arc."""
-    return np.roll(points[::2], -1, axis=0) - points[::2]
+def _halves(points: np.ndarray) -> np.ndarray:
+    """(M, 2) um, from each node to the next."""
+    return np.roll(points, -1, axis=0) - points
+
+
+def _centred(outline: Outline) -> Outline:
+    """The outline with the middles of its arcs about the middles of their chords."""
+    arcs = outline.arcs(outline.points)
+    chords = arcs[:, 2] - arcs[:, 0]
+    part = np.sum((arcs[:, 1] - arcs[:, 0]) * chords, axis=1) / np.sum(chords**2, axis=1)
+    t = 1 / (4 * part - 1 + np.sqrt(1 + 4 * (2 * part - 1) ** 2))  # half of the chord there
+    far = (np.abs(part - 0.5) > CENTRED) & (outline.edge_wall == FREE)
+    points = outline.points.copy()
+    points[1::2][far] = np.einsum("ea,eai->ei", parabola(t[far]), arcs[far])
+    return replace(outline, points=points, origin=points)
 
 
 def _joined(outline: Outline, joint: int) -> Outline:

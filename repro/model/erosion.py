@@ -175,17 +175,22 @@ def surface_shear(space: Space, water: Flow, drive: Drive, outline: Outline,
                   region: Region) -> np.ndarray:
     """(M,) MPa, shear rho nu |t . (grad u + grad u^T) n| of the water at the nodes of a surface.
 
-    A corner of two arcs has the mean of both; nodes on a wall that are no contact lines have none.
+    The velocity gradient is the linear fit in the triangle beside an arc: a curved triangle in the
+    corner at a contact line may have a node where its map is nearly singular. A corner of two arcs
+    has the mean of both; nodes on a wall that are no contact lines have none.
     """
     mesh = space.mesh
-    edges = outline.arcs(region.loop).astype(int)
     free = np.flatnonzero(outline.edge_wall == FREE)
-    wet = np.flatnonzero(~mesh.biomass)
-    owner, places = beside(mesh.cells[wet], edges[free])
-    cells = mesh.cells[wet][owner]
-    _, gradients = elements.mapped(mesh.points[cells], elements.node_table(mesh.geometry))
+    edges = outline.arcs(region.loop)[free][:, ::2].astype(int)
+    wet = mesh.cells[~mesh.biomass]
+    owner, places = beside(wet, edges)
+    cells = wet[owner]
+    table = space.gradient_table
+    _, gradients = elements.mapped(mesh.points[cells], table)
     grad = np.einsum("eai,eqka->eqik", water.velocity[cells], gradients)
-    rate = np.take_along_axis(grad, places[:, :, None, None], axis=1)
+    fitted = np.einsum("cq,eqik->ecik", elements.linear_fit(table), grad)
+    start, end = np.moveaxis(np.take_along_axis(fitted, places[:, :, None, None], axis=1), 1, 0)
+    rate = np.stack([start, 0.5 * (start + end), end], axis=1)
     rate = rate + np.swapaxes(rate, 2, 3)
     normal = recession.normals(outline)[free]
     along = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
