@@ -339,8 +339,8 @@ class Erosion:
         "0.1 um/h", "um/h", default=None, source=NOT_IN_PAPER, about="Of the law \"constant\"")
     thickness_coefficient: float | None = quantity(
         "0.01 1/um/h", "1/um/h", default=None,
-        source=NOT_IN_PAPER + "; Wanner and Gujer 1986, Xavier et al. 2005",
-        about="Of the law \"thickness squared\"")
+        source=NOT_IN_PAPER,
+        about="Of the law \"thickness squared\" (Wanner and Gujer 1986, Xavier et al. 2005)")
     shear_coefficient: float | None = quantity(
         "1 um/h/Pa", "um/h/MPa", default=None, source=NOT_IN_PAPER,
         about="Of the law \"shear\"")
