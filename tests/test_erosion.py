@@ -17,10 +17,8 @@ from repro.model.stages import Stages
 from repro.runs.state_arrays import pack_state, unpack_state
 from repro.runs.status import is_over
 from repro.scene import SceneError, load_scene
-
-from verification.problems.erosion import MU, erosion
+from verification.problems.erosion import MU, erosion, shaped
 from verification.problems.erosion import half_disc as growing_disc
-from verification.problems.erosion import shaped
 
 WALLS = channel_walls(50.0)
 
@@ -105,7 +103,7 @@ def test_a_surface_that_crosses_itself_is_refused():
 def test_what_is_inside_keeps_its_composition():
     """The share of inert biomass rises linearly from the wall. What stays has the integral of this share over the
     smaller half-disc, and the present shape as its reference."""
-    radius, speed, density = 10.0, 2.0, 300.0
+    radius, speed, density = 10.0, 0.5, 300.0
     scene = growing_disc(radius, erosion("constant", speed), "numerics.refinement=0.6")
     pore = seeded(scene)
     y = pore.space.points[pore.space.reaction.cells][..., 1] @ pore.space.reaction.values.T
@@ -133,7 +131,7 @@ def run(scene):
 
 
 def test_the_tolerance_bounds_the_error_of_erosion():
-    """The growth is uniform and has no error. The step follows from the difference of what is detached in the halves of a step."""
+    """The growth is uniform and has no error. The length of a step follows from what is detached in its halves."""
     tolerance = 0.0025
     scene = growing_disc(10.0, erosion("constant", 0.8), f"numerics.tolerance={tolerance}", 'growth.end="6 h"',
                          'output.times=["6 h"]')
@@ -176,7 +174,8 @@ def test_an_aggregate_that_is_eroded_ends_the_run_or_leaves(after):
 @pytest.mark.parametrize("radius, steady", [(10, True), (11, False)])
 def test_a_run_ends_as_steady_only_if_asked_for_and_steady(radius, steady):
     """The balance at 2 v / mu = 10 um is not stable, but a run of hours stays there."""
-    changes = (erosion("constant", 0.5), 'growth.end="1 h"', 'output.times=["1 h"]', 'growth.steady_tolerance="1e-3 1/h"')
+    changes = (erosion("constant", 0.5), 'growth.end="1 h"', 'output.times=["1 h"]',
+               'growth.steady_tolerance="1e-3 1/h"')
     _, status = run(growing_disc(radius, *changes, "growth.until=steady"))
     assert (status == "completed") is not steady
     assert not steady or status.startswith("the aggregates are steady at t = ") and is_over(status)

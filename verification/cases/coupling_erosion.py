@@ -5,11 +5,12 @@ import pytest
 from reference import erosion as reference
 from repro import load_scene
 from repro.model.flow import MPA_PER_UM
-from verification.evidence.cases import combined, parametrize
+from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_most, study
 from verification.problems.erosion import MU, REACH, advance, erosion, half_disc, layer, middle_thickness
 
-#: Equal steps to a time (h). The order was 2.0 between 1, 2 and 4 steps on the mesh of `fast` when the band was written.
+#: Equal steps to a time (h). The order of the half-disc between 1, 2 and 4 steps in `fast`, 2.0, was known before its
+#: band was written; the orders of the layer were not.
 STEPS, END = np.array([1, 2, 4, 8]), 4.0
 STRANG = "Strang's splitting and the midpoint rule: second order in the step"
 PER_PA = 1e6  # um/h/Pa in um/h/MPa

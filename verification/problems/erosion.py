@@ -1,8 +1,8 @@
 """Aggregates that grow uniformly and erode: half-discs, and flat layers in the middle of a wide bonded aggregate.
 
-The uptake of zero order gives active biomass without decay the same growth everywhere. A bonded layer cannot spread, and
-its ends reach no farther than a few thicknesses: after 4 h without erosion the middle is 1e-5 um too thin if the ends
-are 90 um away.
+The uptake of zero order gives active biomass without decay the same growth everywhere. A bonded layer cannot spread,
+and its ends reach no farther than a few thicknesses: after 4 h without erosion the middle is 1e-5 um too thin if the
+ends are 90 um away.
 """
 from dataclasses import replace
 
@@ -19,7 +19,8 @@ from repro.scene import Scene, load_scene
 #: mu (1/h), and the half length of a layer (um).
 MU, REACH = 0.1, 100.0
 UNIFORM = ("numerics.preset=fast", "kinetics.law=zero order", f'kinetics.maximum_utilization_rate="{2 * MU} 1/h"',
-           "kinetics.yield_coefficient=0.5", 'kinetics.decay_coefficient="0 1/h"', 'kinetics.maximum_density="300 mg/L"',
+           "kinetics.yield_coefficient=0.5", 'kinetics.decay_coefficient="0 1/h"',
+           'kinetics.maximum_density="300 mg/L"',
            "growth.new_biomass=stress_free", 'growth.end="50 h"', "numerics.extent=full")
 LAWS = {"constant": 'law="constant", speed="{} um/h"',
         "thickness squared": 'law="thickness squared", thickness_coefficient="{} 1/um/h"',
