@@ -52,7 +52,8 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3.3  closing of films                 repro.model.closing_by_nodes, .closing_by_lines
            contact lines                    repro.model.contact_lines, .contact_newton
     5    adhesion, tearing                  repro.model.adhesion
-         erosion (not the paper's)          repro.model.erosion, repro.fem.recession
+         erosion (not the paper's)          repro.model.erosion
+         receding outlines                  repro.fem.recession
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  first mesh, remeshing         repro.model.meshing, .remeshing, .grading
@@ -60,8 +61,8 @@ Sections of the paper and their modules, which name the equations that they solv
     2    flow and substrates in it          repro.model.solving
          both schemes, as printed           repro.schemes
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
-         error control (not the paper's)    repro.march.midpoint, .stepping, .step_control,
-                                            .eroding
+         error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
+         steps with erosion                 repro.march.eroding
          ends of the model                  repro.march.ends, .folding
          the loop of both                   repro.march.loop, .state, .simulation
     4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, repro.network
