@@ -17,7 +17,7 @@ from repro.model.stages import Stages
 from repro.runs.state_arrays import pack_state, unpack_state
 from repro.runs.status import is_over
 from repro.scene import SceneError, load_scene
-from verification.problems.erosion import MU, erosion, shaped
+from verification.problems.erosion import MU, erosion, layer, middle_thickness, shaped
 from verification.problems.erosion import half_disc as growing_disc
 
 WALLS = channel_walls(50.0)
@@ -180,6 +180,17 @@ def test_a_run_ends_as_steady_only_if_asked_for_and_steady(radius, steady):
     assert (status == "completed") is not steady
     assert not steady or status.startswith("the aggregates are steady at t = ") and is_over(status)
     assert run(growing_disc(radius, *changes))[1] == "completed"
+
+
+@pytest.mark.thorough
+def test_a_layer_ends_as_steady_near_its_balance():
+    """Its middle follows the logistic curve towards mu / k = 10 um; its ends roll slowly over the wall."""
+    scene = layer(9.0, erosion("thickness squared", 0.01), "growth.until=steady", 'growth.steady_tolerance="5e-3 1/h"',
+                  'growth.end="40 h"', 'output.times=["40 h"]', "numerics.refinement=0.1")
+    reports, status = run(scene)
+    time = reports[-1].pore.time
+    assert status.startswith(f"the aggregates are steady at t = {time:g} h") and 10 < time < 40
+    assert middle_thickness(reports[-1].pore) == pytest.approx(reference.layer(9.0, MU, 0.01, time), rel=1e-3)
 
 
 def test_no_state_is_steady_before_the_last_time_of_a_table():
