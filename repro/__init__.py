@@ -29,7 +29,8 @@ Functions; every argument after these is given by its name:
 
 Errors: ``SceneError`` (a scene is refused), ``OutputError`` (a folder or file is refused),
 ``SimulationError`` (a stage fails), ``TypeError`` (an argument is refused). ``PoreEnd``,
-``Fold``, ``Meeting`` and ``Detachment`` are ends of the model, which only ``simulate`` raises.
+``Fold``, ``Meeting``, ``Detachment`` and ``Steady`` are ends of the model, which only ``simulate``
+raises.
 
 Sections of the paper and their modules, which name the equations that they solve:
 
@@ -51,6 +52,8 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3.3  closing of films                 repro.model.closing_by_nodes, .closing_by_lines
            contact lines                    repro.model.contact_lines, .contact_newton
     5    adhesion, tearing                  repro.model.adhesion
+         erosion (not the paper's)          repro.model.erosion
+         receding outlines                  repro.fem.recession
          limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  first mesh, remeshing         repro.model.meshing, .remeshing, .grading
@@ -59,6 +62,7 @@ Sections of the paper and their modules, which name the equations that they solv
          both schemes, as printed           repro.schemes
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          error control (not the paper's)    repro.march.midpoint, .stepping, .step_control
+         steps with erosion                 repro.march.eroding
          ends of the model                  repro.march.ends, .folding
          the loop of both                   repro.march.loop, .state, .simulation
     4, 5  results, laws for networks        repro.results, .columns, .arrays, .tables, repro.network
@@ -94,6 +98,7 @@ if TYPE_CHECKING:
     from repro.march.ends import Detachment as Detachment
     from repro.march.ends import Meeting as Meeting
     from repro.march.ends import PoreEnd as PoreEnd
+    from repro.march.ends import Steady as Steady
     from repro.march.folding import Fold as Fold
     from repro.march.simulation import simulate
     from repro.network.resistance import added_resistance
@@ -114,6 +119,7 @@ else:
                 "Meeting": "march.ends", "OutputError": "errors",
                 "PoreEnd": "march.ends", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
+                "Steady": "march.ends",
                 "added_resistance": "network.resistance", "check": "preflight.checked",
                 "compare": "report", "load_run": "runs.scripts", "load_scene": "scene",
                 "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",

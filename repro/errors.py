@@ -125,6 +125,16 @@ class GrowthError(StageError):
     stage = "growth"
 
 
+class ErosionError(StageError):
+    """The surface of an aggregate recedes too far in one step."""
+
+    stage = "erosion"
+
+
+class ContactEroded(ErosionError):
+    """Nothing is left of a contact surface after one step."""
+
+
 class TransferError(StageError):
     """Fields cannot be transferred from one mesh to another."""
 
@@ -142,7 +152,7 @@ class BalanceError(StageError):
 
 
 class RunEnd(Exception):
-    """The model ends before ``growth.end``: Detachment, Fold, Meeting or PoreEnd. No failure."""
+    """The model ends before ``growth.end``: an end of :mod:`repro.march.ends`. No failure."""
 
 
 class SimulationError(RuntimeError):

@@ -13,6 +13,8 @@ PARTS = {
         "growing", "growth", "mechanics", "mesh_motion", "remeshing", "stages", "support", "surface", "traction")),
         "repro.fem.division", "repro.fem.transfer",
         *(f"repro.march.{name}" for name in ("balance", "ends", "folding", "loop"))},
+    "erosion": {"repro.model.erosion", "repro.fem.recession"},
+    "eroding": {"repro.march.eroding"},
     "midpoint": {"repro.march.midpoint", "repro.march.stepping"},
     "updates": {"repro.march.updates"},
     "substrates": {f"repro.model.{name}" for name in ("kinetics", "substrates", "transport", "uptake_law")},
@@ -39,8 +41,10 @@ def modules_of(names):
     ("'flow_only'", ""),
     (f"'base', {AT_REST}]", "substrates"),
     (f"'base', {AT_REST}, 'numerics.transport=gear']", "substrates gear"),
-    ("'base', ['numerics.preset=fast']", "substrates growth midpoint")],
-    ids=["flow", "substrates", "transient", "growth"])
+    ("'base', ['numerics.preset=fast']", "substrates growth midpoint"),
+    ("'base', ['numerics.preset=fast', 'growth.new_biomass=stress_free', 'growth.erosion.speed=\"0.1 um/h\"']",
+     "substrates growth midpoint erosion")],
+    ids=["flow", "substrates", "transient", "growth", "erosion"])
 def test_a_simulation_loads_the_modules_of_its_sections_alone(arguments, parts):
     """The row at t = 0 is the only one of a scene without growth."""
     modules = loaded(f"next(repro.simulate({arguments}))")

@@ -71,9 +71,24 @@ def test_the_output_is_the_scene_alone(name, preset, capsys):
 def test_every_key_may_be_made_active_at_once(name):
     drive = load_scene(name).flow
     excluded = {"rate", "head" if drive and drive.head is None else "mean_velocity"}
-    scene = parsed(uncommented(scene_text(name), left_out={*excluded, "outline", "permeability"}), name)
+    text, _ = without_erosion(scene_text(name))
+    scene = parsed(uncommented(text, left_out={*excluded, "outline", "permeability"}), name)
     assert None not in (scene.aggregate, scene.flow, scene.substrates, scene.kinetics, scene.growth)
     assert scene.output.times == (5.0, 18.0)
+
+
+def without_erosion(text):
+    """The text without [growth.erosion], which excludes the stress of growth and other keys, and this section."""
+    section = text[text.index("#[growth.erosion]"):text.index("[numerics]")]
+    return text.replace(section, ""), section
+
+
+def test_the_section_of_erosion_may_be_made_active():
+    """With the key of its law alone, and what it needs."""
+    _, section = without_erosion(scene_text("base"))
+    section = uncommented(section, left_out={"thickness_coefficient", "shear_coefficient"})
+    tables = tomllib.loads(f'[aggregate]\n[substrates]\n[growth]\nend = "1 h"\nnew_biomass = "stress_free"\n{section}')
+    assert parse_scene(tables, "base", "again").growth.erosion.speed == 0.1
 
 
 @pytest.mark.parametrize("name", packaged_scenes())

@@ -425,7 +425,10 @@ ENDS = ["the aggregate reaches the pore's downstream end at t = 0 h",
         "the aggregate's surface folds in the step from t = 2 h: growth compressed it near x = 3 um",
         "the aggregate detaches at t = 1e-05 h: near x = 3, y = 0 um its wall must bear 2 MPa",
         "the aggregate tears at t = 12 h: near x = 3, y = 0 um its tensile stress is 2 MPa",
-        "aggregates left and 2 meet at t = 3.5 h: near x = 3, y = 20 um the film between them is 2 um"]
+        "aggregates left and 2 meet at t = 3.5 h: near x = 3, y = 20 um the film between them is 2 um",
+        "aggregate left is eroded at t = 3 h: its thickness or contact is 2 um, below growth.minimum_film",
+        "erosion takes a contact surface at y = 20 um in the step from t = 3 h",
+        "the aggregates are steady at t = 30 h: their area, thickness and length change by 0.0009 of themselves per h"]
 STATUSES = dict.fromkeys([COMPLETED, *ENDS], True) | dict.fromkeys(
     [f"{FAILED}x", INTERRUPTED, RUNNING, f"{ENDS[0]}!", ENDS[2].partition(":")[0], ENDS[4].partition(":")[0]], False)
 
@@ -468,7 +471,7 @@ def test_every_status_takes_its_whole_path_through_a_sweep(tmp_path, capsys):
 
 
 def test_every_end_of_the_model_is_among_the_statuses():
-    assert {repro.PoreEnd, repro.Fold, repro.Detachment, repro.Meeting} == {*RunEnd.__subclasses__()}
+    assert {repro.PoreEnd, repro.Fold, repro.Detachment, repro.Meeting, repro.Steady} == {*RunEnd.__subclasses__()}
     assert all(any(end.fullmatch(status) for status in ENDS) for end in RUN_ENDS)
 
 

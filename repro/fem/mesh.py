@@ -54,16 +54,16 @@ class Dofs:
     def beside_inlet(self) -> tuple[np.ndarray, np.ndarray]:
         """(E,) triangle of each edge of the inlet, and (E, 2 or 3) places of the edge's nodes
         among those of the triangle."""
-        return _beside(self.cells, self.inlet)
+        return beside(self.cells, self.inlet)
 
     @cached_property
     def beside_outlet(self) -> tuple[np.ndarray, np.ndarray]:
         """Like :attr:`beside_inlet`, for the outlet."""
-        return _beside(self.cells, self.outlet)
+        return beside(self.cells, self.outlet)
 
 
-def _beside(cells: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangle of each edge (E, e) of an end, and places of the edge's nodes in it."""
+def beside(cells: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The triangle of cells (T, 3 or 6) beside each edge (E, e), and places of its nodes there."""
     first = np.flatnonzero(np.isin(cells[:, :3], edges[:, [0, -1]]).sum(axis=1) >= 2)
     near = cells[first, :3]
     has_start = (near == edges[:, None, None, 0]).any(axis=2)
@@ -111,7 +111,7 @@ class Region:
         """(edges,) its triangle beside each edge of ``loop``, and the number of this edge among the
         triangle's edges 01, 12 and 20."""
         line = self.loop[:: elements.order_of(self.cells)]
-        owner, places = _beside(self.cells, np.column_stack([line, np.roll(line, -1)]))
+        owner, places = beside(self.cells, np.column_stack([line, np.roll(line, -1)]))
         return owner, places[:, 0]
 
 

@@ -93,6 +93,11 @@ class Outline:
             points = np.einsum("ta,kai->kti", parabola(t), self.arcs(points)).reshape(-1, 2)
         return shapely.LinearRing(points)
 
+    @property
+    def is_simple(self) -> bool:
+        """Does the curve not cross itself?"""
+        return bool(self._ring.is_simple)
+
     def same_contact(self, other: Outline) -> bool:
         """Does each node touch the same wall in both outlines?"""
         return np.array_equal(self.wall, other.wall)

@@ -36,7 +36,8 @@ class Ledger:
     """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass,
     then the unmet demand of both substrates (:mod:`repro.model.kinetics`).
 
-    detached: biomass of the aggregates that have left the pore at the step's end.
+    detached: biomass that erosion has removed in the step, and that of the aggregates that have
+    left the pore at its end.
     """
 
     start: float

@@ -7,6 +7,7 @@ Each end is an event: a margin that is zero at the event and positive after it.
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
     meeting       1 - film between two aggregates / growth.minimum_film
+    eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is judged at t = 0, at the end of each step, and on both sides of a jump of the
 scene's tables, where the aggregate takes its new equilibrium at once. If it is positive, shorter
@@ -14,9 +15,13 @@ steps from the same start locate its zero (:func:`locate`): the first of all end
 that state, because the model has no law for what follows. A margin that becomes positive and
 negative again within one step is not noticed.
 
-With growth.after_detachment = "continue" an aggregate that detaches from its only wall leaves the
-pore, and the run goes on. If it touches both walls and one of them gives way, the run ends: the
-model has no law for a surface that is set free.
+With growth.after_detachment = "continue" an aggregate that detaches from its only wall, or that
+erosion has worn down, leaves the pore, and the run goes on. If it touches both walls and one of
+them gives way, or erosion takes a contact surface, the run ends: the model has no law for a surface
+that is set free.
+
+With growth.until = "steady" a run also ends after a step in which the aggregates hardly change
+(:func:`steadiness`). This end is not located.
 
 Two ends have no margin, and are not located. A step without a smooth equilibrium ends a run as a
 fold if the surface can crease (:mod:`repro.march.folding`). Biomass that is born without stress has
@@ -33,6 +38,7 @@ from math import inf
 import numpy as np
 
 from repro.errors import RunEnd, StageError
+from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.folding import Fold, fold_message, most_compressed
 from repro.march.state import Compression, StepResult
@@ -41,7 +47,7 @@ from repro.model.adhesion import Loading, Peak
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.scene import Pore as Channel
-from repro.scene import Scene, Stated
+from repro.scene import Scene, Stated, TimeTables
 
 #: An end is located if its margin is positive and at most this. The relative error of its time is
 #: this over d ln(stress) / d ln(t). The least numerics.tolerance of a preset is 2.5e-4.
@@ -95,11 +101,12 @@ class Meeting(RunEnd):
 
 
 class Detachment(RunEnd):
-    """The aggregate detaches from a wall, or tears.
+    """The aggregate detaches from a wall, tears, or is eroded.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the place (um), the stress there and the strength that
-    it exceeds. It needs ``growth.bonding_strength`` or ``growth.tensile_strength``.
+    it exceeds; or what erosion has left. It needs ``growth.bonding_strength``,
+    ``growth.tensile_strength`` or ``[growth.erosion]``.
 
     Examples
     --------
@@ -111,6 +118,24 @@ class Detachment(RunEnd):
     ... except repro.Detachment as end:
     ...     print(str(end)[:25])
     the aggregate detaches at
+    """
+
+
+class Steady(RunEnd):
+    """The aggregates are steady: they change by less than ``growth.steady_tolerance``.
+
+    :func:`repro.simulate` raises it after the last Report if ``growth.until = "steady"``. It is an
+    end of the model, not a failure: the message names the time (h) and the largest change (1/h).
+
+    Examples
+    --------
+    >>> import repro
+    >>> changes = ["growth.until=steady", 'growth.steady_tolerance="1 1/h"', "numerics.preset=fast"]
+    >>> try:
+    ...     times = [report.pore.time for report in repro.simulate("base", changes)]
+    ... except repro.Steady as end:
+    ...     print(str(end)[:25])
+    the aggregates are steady
     """
 
 
@@ -166,23 +191,51 @@ class Strength:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Data from which the ends of a run follow; None for strengths that the scene leaves out."""
+    """Data from which the ends of a run follow; None for strengths that the scene leaves out.
+    tables: over time, before whose last time no state is steady."""
 
     channel: Channel
     loading: Loading
     bonding: Strength | None
     tensile: Strength | None
+    tables: TimeTables
 
     @classmethod
     def of(cls, scene: Scene) -> Ends:
         """The ends of a scene with growth."""
         return cls(scene.pore, Loading.of(scene), Strength.of(scene, "bonding_strength"),
-                   Strength.of(scene, "tensile_strength"))
+                   Strength.of(scene, "tensile_strength"), scene.time_tables)
 
 
-def nearest_end(ends: Ends, pore: Pore, solved: Solved) -> Event:
-    """The end with the largest margin in a state."""
-    return max(_events(ends, pore, solved), key=lambda event: event.margin)
+def nearest_end(ends: Ends, pore: Pore, solved: Solved, start: Pore | None = None) -> Event:
+    """The end with the largest margin in a state; start: of the step that leads to it, if any."""
+    events = list(_events(ends, pore, solved))
+    if start is not None and ends.loading.growth.until_steady:
+        events.append(steadiness(ends, start, pore))
+    return max(events, key=lambda event: event.margin)
+
+
+def steadiness(ends: Ends, start: Pore, pore: Pore) -> Event:
+    """The event of a steady state after a step: CLOSE if area, thickness and length of each
+    aggregate change by less than the tolerance in the mean over the step, else -1.
+
+    The tables over time must be past their last time, and no aggregate may leave in the step.
+    """
+    tolerance = ends.loading.growth.steady_tolerance
+    change = inf
+    if len(pore.bodies) == len(start.bodies) and ends.tables.corner(start.time) == inf:
+        ratios = np.array([_extents(after) for after in pore.outlines]) / np.array(
+            [_extents(before) for before in start.outlines])
+        change = float(np.abs(np.log(ratios)).max(initial=0.0)) / (pore.time - start.time)
+    end = Steady(f"the aggregates are steady at t = {pore.time:g} h: their area, thickness and "
+                 f"length change by {change:.2g} of themselves per h at most; "
+                 f"growth.steady_tolerance is {tolerance:g} 1/h")
+    return Event(CLOSE if change < tolerance else -1.0, end)
+
+
+def _extents(outline: Outline) -> tuple[float, float, float]:
+    """Area (um2), thickness and length (um)."""
+    return outline.area, outline.thickness, outline.downstream - outline.upstream
 
 
 def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
@@ -195,6 +248,8 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(pore.biot / compression.stretch - 1, fold)
     yield from _meetings(ends.loading.growth.minimum_film, pore)
+    if ends.loading.growth.erosion:
+        yield from _eroded(ends.loading.growth.minimum_film, pore)
     if ends.bonding is not None:
         peaks = adhesion.wall_peaks(ends.loading, pore, solved)
         for number, (body, peak) in enumerate(zip(pore.bodies, peaks)):
@@ -204,6 +259,16 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
     if ends.tensile is not None:
         for number, peak in enumerate(adhesion.tensile_peaks(ends.loading, pore, solved)):
             yield _detachment(ends.tensile, pore, number, peak, "tears", "its tensile stress is")
+
+
+def _eroded(least: float, pore: Pore) -> Iterator[Event]:
+    """The events of all aggregates that erosion wears down; least: um."""
+    for number, (body, outline) in enumerate(zip(pore.bodies, pore.outlines)):
+        own, *_ = body.seat.walls(pore.mesh.walls)
+        extent = min(outline.thickness, outline.contact_length(own))
+        end = Detachment(f"{name_of(pore, number)} is eroded at t = {pore.time:g} h: its thickness "
+                         f"or contact is {extent:.4g} um, below growth.minimum_film")
+        yield Event(least / extent - 1, end, None if body.spans else number)
 
 
 def _meetings(least: float, pore: Pore) -> Iterator[Event]:

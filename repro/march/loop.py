@@ -98,7 +98,7 @@ def steps(scene: Scene, stepping: Stepping,
 
     The scene has growth. Raises SimulationError if a stage fails. After the last Report, raises
     PoreEnd if an aggregate reaches an end of the pore, Fold if its surface folds, Meeting if two
-    aggregates meet, and Detachment if one leaves a wall or tears.
+    aggregates meet, Detachment if one leaves a wall, tears or is eroded, and Steady.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
@@ -188,7 +188,7 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
     stepping = course.stepping
 
     def reached(step: StepResult, after: Solved) -> Reached:
-        return Reached(step, after, nearest_end(course.ends, step.pore, after))
+        return Reached(step, after, nearest_end(course.ends, step.pore, after, pore))
 
     step, after, control = stepping.advance(stages, pore, solved, state.step_control)
     end = reached(step, after)

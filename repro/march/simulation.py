@@ -77,7 +77,9 @@ def simulate(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] =
         After the last Report, if the surface of the aggregate folds.
     Detachment
         After the last Report, if a wall must bear more than ``growth.bonding_strength``, or the
-        aggregate more than ``growth.tensile_strength``.
+        aggregate more than ``growth.tensile_strength``, or if the aggregate is eroded.
+    Steady
+        After the last Report, if the aggregates are steady and ``growth.until = "steady"``.
 
     Examples
     --------

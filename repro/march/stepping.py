@@ -15,12 +15,14 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from repro.errors import RunEnd, StageError, Unresolved
 from repro.march import midpoint
 from repro.march.loop import Stepping, before_jump
+from repro.march.midpoint import Attempt
 from repro.march.state import SAME_TIME, InterpolatedState, StepResult, contiguous
 from repro.march.step_control import (
     EXCESS,
@@ -87,12 +89,20 @@ def _row(stages: Stages, previous: Pore, solved: Solved, control: StepControl,
     return InterpolatedState(replace(previous, time=time), solved)
 
 
+def _attempt(stages: Stages, *arguments: Any) -> Attempt:
+    """Attempt a step, by :func:`midpoint.attempt`, or by :func:`eroding.attempt` with erosion."""
+    if stages.erosion is None:
+        return midpoint.attempt(stages, *arguments)
+    from repro.march import eroding  # a scene without erosion does not load it
+    return eroding.attempt(stages, *arguments)
+
+
 def _cut(stages: Stages, previous: Pore, solved: Solved,
          time: float) -> tuple[StepResult, Solved]:
     """Make a step to a time (h) before the end of a step that is accepted."""
     while True:
         try:
-            trial = midpoint.attempt(stages, previous, solved, time - previous.time)
+            trial = _attempt(stages, previous, solved, time - previous.time)
             break
         except Unresolved:
             finer = _halve_elements(stages, previous)
@@ -124,7 +134,7 @@ def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepCont
         largest_change = np.inf if last else EXCESS * tolerance / duration
         try:
             search = SearchOptions(landing=0.0 if last else LANDED, patient=last)
-            trial = midpoint.attempt(stages, previous, solved, duration, largest_change, search)
+            trial = _attempt(stages, previous, solved, duration, largest_change, search)
             estimate = trial.change * duration
             if trial.step:
                 end = _end_of(previous, duration, corner)

@@ -98,6 +98,17 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
     return TRANSFERS[method](old, new, at, amounts, density)
 
 
+def _inside(old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
+    """Transfer the shares of the biomass to smaller aggregates within the old ones, whose density
+    is X_m everywhere."""
+    total = amounts[0] + amounts[1]
+    share = old.integration.to_nodes(amounts[1] / total)[:, None]
+    nodal = new.mesh.from_body(at.field(share, old.mesh.cells[old.mesh.biomass]))[:, 0]
+    masses = density * new.reaction.dx
+    inert = np.clip(new.integration.to_points(nodal), 0.0, 1.0) * masses
+    return masses - inert, inert
+
+
 def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
     """Transfer the shares of the biomass; the new mesh has the density X_m everywhere."""
     total = amounts[0] + amounts[1]
@@ -151,4 +162,5 @@ TRANSFERS: dict[str, Callable[..., Amounts]] = {
     "projection": partial(_by_densities, transfer.project),
     "interpolation": partial(_by_densities, transfer.interpolated),
     "shares": _by_shares,
+    "inside": _inside,
 }

@@ -212,6 +212,24 @@ def without(rules: Remeshing, pore: Pore, number: int, speed: float) -> Pore:
     return remesh(rules, rest, rest, speed)[0]
 
 
+def within(rules: Remeshing, pore: Pore, outlines: Sequence[Outline], speed: float) -> Pore:
+    """The pore with its aggregates cut off at outlines within them, on a new mesh.
+
+    What is inside keeps its densities and its last shape. Its present shape is its reference from
+    now on, which loses no strain because new biomass has none. speed: as for :func:`remesh`.
+    """
+    mesh, outlines = rules.meshing.around(outlines, pore.front)
+    new = Space(mesh)
+    at = _located_in(pore, mesh)
+    bodies = tuple(replace(body, wall=outline.wall, fixed=outline.fixed,
+                           solid=material(new, region, mesh.points[region.nodes],
+                                          body.solid.energy))
+                   for body, outline, region in zip(pore.bodies, outlines, mesh.regions))
+    target = replace(pore, space=new, bodies=bodies,
+                     concentrations=_carried(rules, pore, pore, new, speed))
+    return _transferred(replace(rules, transfer="inside"), pore, target, at)[0]
+
+
 def _carried(rules: Remeshing, previous: Pore, expanded: Pore, new: Space,
              speed: float) -> Concentrations | None:
     """The substrates of an expanded pore on a new mesh; arguments as in :func:`remesh`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from repro.model import biomass, contact, growing, remeshing
 from repro.model.biomass import Rates
@@ -17,6 +18,9 @@ from repro.model.transport_in_time import TransportInTime
 from repro.scene import Growth, Scene, TimeTables, needed
 from repro.scene import Pore as Channel
 
+if TYPE_CHECKING:
+    from repro.model.erosion import Erosion
+
 
 @dataclass(frozen=True, eq=False)
 class Stages:
@@ -24,7 +28,7 @@ class Stages:
 
     growth: section [growth] of the scene; tables: times at which steps end, and jumps; tolerance:
     of a step; grading: flow and substrates, on a mesh that resolves them; mechanics: shape of the
-    grown aggregate.
+    grown aggregate; erosion: of its surface, None without it.
     """
 
     growth: Growth
@@ -32,13 +36,18 @@ class Stages:
     tolerance: float
     grading: Grading
     mechanics: Mechanics
+    erosion: Erosion | None = None
 
     @classmethod
     def of(cls, scene: Scene) -> Stages:
         """The stages of a scene with growth."""
         _, _, growth = scene.growing
+        erosion = None
+        if growth.erosion:
+            from repro.model.erosion import Erosion  # a scene without it does not load it
+            erosion = Erosion.of(scene)
         return cls(growth, scene.time_tables, scene.numerics.tolerance, Grading.of(scene),
-                   Mechanics.of(scene))
+                   Mechanics.of(scene), erosion)
 
     @property
     def solver(self) -> Solver:

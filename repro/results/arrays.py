@@ -69,7 +69,7 @@ NEEDS: dict[str, Callable[[State], bool]] = {
     "donor": lambda state: _has("donor", state),
     "biomass": lambda state: state.scene.kinetics is not None,
     "growth": lambda state: state.scene.growth is not None and bool(state.pore.bodies),
-    ORIGIN: lambda state: (NEEDS["growth"](state)
+    ORIGIN: lambda state: (NEEDS["growth"](state) and state.scene.growth.erosion is None
                            and all(body.origin_known for body in state.pore.bodies)),
     "stress": lambda state: NEEDS["growth"](state) and state.pore.accumulates}
 

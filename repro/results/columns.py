@@ -395,10 +395,10 @@ LEDGER = (
              signed=True),
 )
 
-#: The column of a ledger whose scene continues after detachment.
-DETACHED = Quantity("detached_pg_per_m", "detached biomass, which leaves at the step's end",
-                    "integral of X_A + X_I over the aggregates that detach; the biomass at the "
-                    "step's end is without it",
+#: The column of a ledger whose scene continues after detachment, or has erosion.
+DETACHED = Quantity("detached_pg_per_m", "detached biomass, which leaves in the step",
+                    "integral of X_A + X_I over what the surfaces pass, and over the aggregates "
+                    "that detach; the biomass at the step's end is without it",
                     lambda scene, step: step.detached, "detached")
 
 COLUMNS = [quantity.name for quantity in SERIES]
@@ -410,7 +410,8 @@ LEDGER_COLUMNS = [quantity.name for quantity in LEDGER]
 
 def ledger_columns(scene: Scene) -> tuple[Quantity, ...]:
     """Columns of the ``ledger.csv`` of a scene."""
-    return (*LEDGER, DETACHED) if scene.growth and scene.growth.continues else LEDGER
+    growth = scene.growth
+    return (*LEDGER, DETACHED) if growth and (growth.continues or growth.erosion) else LEDGER
 
 
 def row(scene: Scene, instant: Report) -> dict[str, float | None]:

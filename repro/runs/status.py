@@ -16,6 +16,9 @@ RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
             re.compile(f"the aggregate's surface folds (?:at|in the step from) {TIME}: growth .*"),
             re.compile(r"(?:the aggregate|aggregate \S+) (?:detaches|tears) at "
                        f"{TIME}: near x = .*"),
+            re.compile(rf"(?:the aggregate|aggregate \S+) is eroded at {TIME}: .*"),
+            re.compile(f"erosion takes a contact surface at y = .* um in the step from {TIME}"),
+            re.compile(f"the aggregates are steady at {TIME}: .*"),
             re.compile(rf"aggregates \S+ and \S+ meet (?:at|in the step from) {TIME}(?:: .*)?"))
 
 

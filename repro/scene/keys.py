@@ -63,6 +63,7 @@ __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene"
 
 NOT_IN_PAPER = "Not in the paper"
 SEED_RADIUS = 5.0  # um, Table 1
+STEADY = "0.001 1/h"
 LAMBDA = 2000.0  # Table 1
 RATIO = 1.52  # F, mg/mg, Table 1
 
@@ -327,6 +328,28 @@ class Kinetics:
 
 
 @dataclass(frozen=True)
+class Erosion:
+    """Speed (um/h) at which free surfaces recede along their normal; the law needs its keys."""
+
+    law: str = choice(
+        "constant", "thickness squared", "shear", source=NOT_IN_PAPER,
+        about="speed; thickness_coefficient z^2, with the distance z from the wall of the seed; "
+              "or shear_coefficient max(tau - critical_shear, 0), with the shear tau of the water")
+    speed: float | None = quantity(
+        "0.1 um/h", "um/h", default=None, source=NOT_IN_PAPER, about="Of the law \"constant\"")
+    thickness_coefficient: float | None = quantity(
+        "0.01 1/um/h", "1/um/h", default=None,
+        source=NOT_IN_PAPER,
+        about="Of the law \"thickness squared\" (Wanner and Gujer 1986, Xavier et al. 2005)")
+    shear_coefficient: float | None = quantity(
+        "1 um/h/Pa", "um/h/MPa", default=None, source=NOT_IN_PAPER,
+        about="Of the law \"shear\"")
+    critical_shear: float = quantity(
+        "0 Pa", "MPa", NON_NEGATIVE, source=NOT_IN_PAPER,
+        about="Shear up to which a surface stays, with the law \"shear\"")
+
+
+@dataclass(frozen=True)
 class Growth:
     """Sections 2.3 and 3.4, (14)-(29), to the time `end` (h), updates every `time_step` (h)."""
 
@@ -372,6 +395,16 @@ class Growth:
     limiting_invariant: float = number(
         LIMITING, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
         about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
+    until: str = choice(
+        "end", "steady", source=NOT_IN_PAPER,
+        about="The run goes on to end, or ends early if the aggregates are steady")
+    steady_tolerance: float = quantity(
+        STEADY, "1/h", source=NOT_IN_PAPER,
+        about="They are if area, thickness and length of each change by less than this part of "
+              "themselves per time, in the mean over a step")
+    erosion: Erosion | None = section(
+        Erosion, default=None, source=NOT_IN_PAPER,
+        about="The water erodes the aggregates' free surfaces; left out: nothing is eroded")
 
     @property
     def bonded(self) -> bool:
@@ -382,6 +415,11 @@ class Growth:
     def continues(self) -> bool:
         """Whether an aggregate that detaches leaves the pore, and the run goes on."""
         return self.after_detachment == "continue"
+
+    @property
+    def until_steady(self) -> bool:
+        """Whether the run ends early if the aggregates are steady."""
+        return self.until == "steady"
 
     @property
     def has_fluid_forces(self) -> bool:
@@ -649,7 +687,7 @@ LATER: dict[str, dict[str, object]] = {
     "pore": {"upper_wall": "no slip"},
     "aggregate": {"position": "0.0 um", "wall": "lower", "smooth": False, "inert_fraction": 0.0},
     "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0,
-               "after_detachment": "end"},
+               "after_detachment": "end", "until": "end", "steady_tolerance": STEADY},
     "numerics": {"contact_elements": 0.0},
     "substrates.donor": {"inhibition_constant": "100.0 mg/L"},
     "kinetics": {"law": "dual Monod", "decay": "with acceptor"},

@@ -35,7 +35,7 @@ NOT_MODELLED = {
                    "glucose phenol"),
     "kinetics": ("one species of bacteria is modelled", "strain strains species"),
     "": ('"{word}" is not modelled',
-         "attachment detachment erosion sloughing dimension dimensions temperature inertia "
+         "attachment detachment sloughing dimension dimensions temperature inertia "
          "turbulence precipitation maintenance quorum ph gas"),
 }
 

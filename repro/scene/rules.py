@@ -10,6 +10,7 @@ from repro.scene.time_table import TimeTable
 if TYPE_CHECKING:
     from repro.scene import (
         Aggregate,
+        Erosion,
         Flow,
         Growth,
         Kinetics,
@@ -344,6 +345,8 @@ def _growth_rules(scene: "Scene") -> Rules:
         yield from _strength_rules(scene.growth)
         yield from _detachment_rules(scene.growth)
         yield from _energy_rules(scene.growth)
+        if scene.growth.erosion:
+            yield from _erosion_rules(scene, scene.growth, scene.growth.erosion)
         yield from _mirrored_rules(scene.growth, scene.pore.upper_wall)
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)
@@ -399,9 +402,40 @@ def _strength_rules(growth: "Growth") -> Rules:
 
 
 def _detachment_rules(growth: "Growth") -> Rules:
-    yield growth.continues and growth.bonding_strength is None, {
-        "growth.after_detachment": "growth.bonding_strength is needed with \"continue\"",
+    yield growth.continues and growth.bonding_strength is None and growth.erosion is None, {
+        "growth.after_detachment": "growth.bonding_strength or [growth.erosion] is needed with "
+                                   "\"continue\"",
         "growth.bonding_strength": 'needed with growth.after_detachment = "continue"'}
+
+
+#: The key that each law of erosion needs.
+LAWS = {"constant": "speed", "thickness squared": "thickness_coefficient",
+        "shear": "shear_coefficient"}
+
+
+def _erosion_rules(scene: "Scene", growth: "Growth", erosion: "Erosion") -> Rules:
+    for law, key in LAWS.items():
+        place = f"growth.erosion.{key}"
+        value = getattr(erosion, key)
+        yield law == erosion.law and value is None, {
+            place: f'needed with growth.erosion.law = "{law}"'}
+        yield law != erosion.law and value is not None, {
+            place: f'growth.erosion.law = "{law}" is needed with it',
+            "growth.erosion.law": f'"{law}" is needed with {place}'}
+    yield erosion.law != "shear" and erosion.critical_shear > 0, {
+        "growth.erosion.critical_shear": 'growth.erosion.law = "shear" is needed with it',
+        "growth.erosion.law": '"shear" is needed with growth.erosion.critical_shear'}
+    yield erosion.law == "shear" and scene.flow is None, {
+        "growth.erosion.law": '[flow] is needed with "shear"'}
+    yield growth.new_biomass == "stressed", {
+        "growth.erosion": 'growth.new_biomass = "stress_free" is needed with it: what erodes is '
+                          "replaced, so that strain since t = 0 grows without limit",
+        "growth.new_biomass": '"stress_free" is needed with [growth.erosion]'}
+    scheme = scene.numerics.scheme
+    yield not (scheme.controls_error and scheme.follows_layers), {
+        "growth.erosion": "the curved elements and the midpoint rule are needed with it, such as "
+                          'those of numerics.preset = "fast"',
+        "numerics.preset": '"fast", "accurate" or "exact" is needed with [growth.erosion]'}
 
 
 def _energy_rules(growth: "Growth") -> Rules:

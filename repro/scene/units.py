@@ -33,6 +33,8 @@ NOUNS = {
     "um^2": "a permeability",
     "um/h": "a velocity",
     "um^3/h": "a flow rate",
+    "1/um/h": "a velocity per area",
+    "um/h/MPa": "a velocity per pressure",
     "um/h^2": "an acceleration",
     "um^2/h": "a diffusivity or kinematic viscosity",
     "1/h": "a rate",

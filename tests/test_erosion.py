@@ -1,0 +1,257 @@
+"""Erosion: how an outline recedes, what stays, how a run ends, and what is refused."""
+
+import numpy as np
+import pytest
+
+import repro
+from reference import erosion as reference
+from repro import results
+from repro.errors import ErosionError
+from repro.fem import recession
+from repro.fem.outline import half_disc, polygon
+from repro.fem.walls import BOTTOM, FREE, channel_walls
+from repro.march import eroding, simulation
+from repro.model.erosion import Erosion
+from repro.model.meshing import seeded
+from repro.model.stages import Stages
+from repro.runs.state_arrays import pack_state, unpack_state
+from repro.runs.status import is_over
+from repro.scene import SceneError, load_scene
+from verification.problems.erosion import MU, erosion, layer, middle_thickness, shaped
+from verification.problems.erosion import half_disc as growing_disc
+
+WALLS = channel_walls(50.0)
+
+
+def receded(outline, distance):
+    """An outline of arcs after a recession (um), without the arcs that it passes."""
+    while True:
+        moves = distance * recession.directions(outline)
+        fewer = recession.merged(outline, moves)
+        if fewer is None:
+            return recession.moved(outline, moves)
+        outline = fewer
+
+
+@pytest.mark.parametrize("angle", [60, 90, 120])
+def test_straight_sides_recede_in_parallel(angle):
+    """A trapezoid whose sides leave the wall at an angle. Its contact lines recede by the distance over the sine, its
+    upper corners along the line that halves them, and small arcs beside its corners vanish."""
+    half, height, distance = 12.0, 8.0, 1.0
+    inwards = height / np.tan(np.radians(angle))
+    corners = [(-half, 0), (inwards - half, height), (half - inwards, height), (half, 0)]
+    outline = polygon(corners, WALLS, 2, at_tips=0.01)
+    shape = receded(outline, distance)
+    base = half - distance / np.sin(np.radians(angle))
+    lower = base - (height - distance) / np.tan(np.radians(angle))
+    assert (-shape.upstream, shape.downstream) == pytest.approx([max(base, lower)] * 2, abs=1e-9)
+    assert shape.contact_length(WALLS[0]) == pytest.approx(2 * base, abs=1e-9)
+    assert shape.area == pytest.approx((base + lower) * (height - distance), rel=1e-9)
+    assert shape.thickness == pytest.approx(height - distance)
+    recession.refuse_invalid(shape, WALLS)
+    arcs = shape.arcs(shape.points)
+    chords = arcs[:, 2] - arcs[:, 0]
+    part = np.sum((arcs[:, 1] - arcs[:, 0]) * chords, axis=1) / np.sum(chords**2, axis=1)
+    assert np.abs(part - 0.5).max() <= recession.CENTRED and (shape.wall[[0, -1]] == [BOTTOM, FREE]).all()
+
+
+@pytest.mark.parametrize("wall", [0, 1])
+def test_a_half_disc_recedes_to_a_half_disc(wall):
+    outline = half_disc(10.0, 8.0, 2, 3.0, WALLS[wall])
+    shape = receded(outline, 4.0)
+    free = shape.wall == FREE
+    assert np.hypot(*(shape.points[free] - [3.0, WALLS[wall].y]).T) == pytest.approx(6.0, abs=1e-6)
+    assert (shape.upstream, shape.downstream) == pytest.approx((-3.0, 9.0))
+
+
+def test_two_arcs_of_a_circle_join_to_an_arc_with_its_middle():
+    """One of the two is half as long as the other."""
+    outline = half_disc(10.0, 4.0, 2)
+    angles = np.array([0.0, 0.15, 0.3, 0.375, 0.45]) + 1.0
+    nodes = np.flatnonzero(outline.wall == FREE)[5:10]
+    outline.points[nodes] = 10.0 * np.column_stack([np.cos(angles), np.sin(angles)])
+    joined = recession._joined(outline, nodes[2] // 2)
+    assert len(joined.points) == len(outline.points) - 2
+    middle = 10.0 * np.array([np.cos(1.225), np.sin(1.225)])
+    assert np.linalg.norm(joined.points - middle, axis=1).min() < 1e-3
+
+
+def test_a_fixed_point_stays_until_a_line_passes_it():
+    """The downstream line recedes; the points between it and the fixed one move, the others stay."""
+    outline = half_disc(10.0, 2.0, 2)
+    last = int(np.flatnonzero(outline.points[:, 0] == 10.0)[0])
+    shapes = []
+    for distance in (4.0, 14.0):
+        moves = np.zeros_like(outline.points)
+        moves[last, 0] = -distance
+        shapes.append(recession.moved(outline, moves).points[outline.fixed][0, 0])
+    assert shapes[0] == 0.0 and -10.0 < shapes[1] < -4.0
+
+
+def test_a_surface_that_crosses_itself_is_refused():
+    """A notch closes upwards as its sides recede; its bottom passes the wall."""
+    outline = polygon([(-20, 0), (-10, 9), (0, 1), (10, 9), (20, 0)], WALLS, 2)
+    lowered = recession.moved(outline, 1.5 * recession.directions(outline))
+    with pytest.raises(ErosionError, match="crosses itself"):
+        recession.refuse_invalid(lowered, WALLS)
+    scene = shaped(erosion("constant", 1.5), 'aggregate.outline=[["-20 um", "0 um"], ["-10 um", "9 um"], '
+                         '["0 um", "1 um"], ["10 um", "9 um"], ["20 um", "0 um"]]')
+    with pytest.raises(ErosionError, match="crosses itself"):
+        Erosion.of(scene).erode(seeded(scene), 1.0, 0.0)
+
+
+def test_what_is_inside_keeps_its_composition():
+    """The share of inert biomass rises linearly from the wall. What stays has the integral of this share over the
+    smaller half-disc, and the present shape as its reference."""
+    radius, speed, density = 10.0, 0.5, 300.0
+    scene = growing_disc(radius, erosion("constant", speed), "numerics.refinement=0.6")
+    pore = seeded(scene)
+    y = pore.space.points[pore.space.reaction.cells][..., 1] @ pore.space.reaction.values.T
+    share = 0.1 + 0.05 * y
+    total = density * pore.space.reaction.dx
+    mixed = pore.with_masses(total * (1 - share), total * share)
+    rest = Erosion.of(scene).erode(mixed, 1.0, 0.0)
+    smaller = radius - speed
+    inert = density * (0.1 * np.pi / 2 * smaller**2 + 0.05 * 2 / 3 * smaller**3)
+    assert rest.inert.sum() == pytest.approx(inert, rel=1e-4)
+    assert rest.mass == pytest.approx(density * np.pi / 2 * smaller**2, rel=1e-4)
+    (body,) = rest.bodies
+    assert body.theta == pytest.approx(1.0, abs=1e-9)
+    assert np.array_equal(body.reference, rest.mesh.points[rest.region.nodes])
+
+
+def run(scene):
+    """The reports of a run, and its status."""
+    reports = []
+    try:
+        reports.extend(repro.simulate(scene))
+    except (repro.Detachment, repro.Steady) as end:
+        return reports, str(end)
+    return reports, "completed"
+
+
+def test_the_tolerance_bounds_the_error_of_erosion():
+    """The growth is uniform and has no error. The length of a step follows from what is detached in its halves."""
+    tolerance = 0.0025
+    scene = growing_disc(10.0, erosion("constant", 0.8), f"numerics.tolerance={tolerance}", 'growth.end="6 h"',
+                         'output.times=["6 h"]')
+    (_, last), _ = run(scene)
+    error = last.pore.boundary.thickness / reference.half_disc(10.0, MU, 0.8, 6.0) - 1
+    assert 0.001 * tolerance < abs(error) < 0.3 * tolerance
+
+
+def test_a_row_within_a_step_is_that_of_a_shorter_step():
+    scene = growing_disc(10.0, erosion("constant", 0.3), 'growth.end="3 h"', 'output.times=["0.7 h", "3 h"]')
+    reports, _ = run(scene)
+    assert [report.pore.time for report in reports] == [0.0, 0.7, 3.0]
+    for report in reports:
+        expected = reference.half_disc(10.0, MU, 0.3, report.pore.time)
+        assert report.pore.boundary.thickness == pytest.approx(expected, abs=1e-3)
+    assert not any(ledger.end < 1 for report in reports for ledger in report.ledgers)
+
+
+@pytest.mark.parametrize("after", ["end", "continue"])
+def test_an_aggregate_that_is_eroded_ends_the_run_or_leaves(after):
+    """It comes to the least film. The run ends there, or goes on as a clean pore; the ledger has its mass."""
+    scene = growing_disc(3.0, erosion("constant", 0.5), 'growth.end="6 h"', 'output.times=["6 h"]',
+                         f"growth.after_detachment={after}")
+    reports, status = run(scene)
+    ledgers = [ledger for report in reports for ledger in report.ledgers]
+    time = 2 / MU * np.log((10 - 2) / (10 - 3))
+    if after == "end":
+        assert status.startswith("the aggregate is eroded at t = ") and is_over(status)
+        assert reports[-1].pore.boundary.thickness == pytest.approx(2.0, rel=2e-4)
+        assert reports[-1].pore.time == pytest.approx(time, rel=0.01)
+    else:
+        assert status == "completed" and reports[-1].pore.bodies == () and reports[-1].pore.time == 6.0
+    for ledger in ledgers:
+        left = ledger.biomass_after + ledger.detached
+        assert left == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-12)
+    columns = results.ledger_row(scene, ledgers[0])
+    assert columns[-1] == ledgers[0].detached > 0
+
+
+@pytest.mark.parametrize("radius, steady", [(10, True), (11, False)])
+def test_a_run_ends_as_steady_only_if_asked_for_and_steady(radius, steady):
+    """The balance at 2 v / mu = 10 um is not stable, but a run of hours stays there."""
+    changes = (erosion("constant", 0.5), 'growth.end="1 h"', 'output.times=["1 h"]',
+               'growth.steady_tolerance="1e-3 1/h"')
+    _, status = run(growing_disc(radius, *changes, "growth.until=steady"))
+    assert (status == "completed") is not steady
+    assert not steady or status.startswith("the aggregates are steady at t = ") and is_over(status)
+    assert run(growing_disc(radius, *changes))[1] == "completed"
+
+
+@pytest.mark.thorough
+def test_a_layer_ends_as_steady_near_its_balance():
+    """Its middle follows the logistic curve towards mu / k = 10 um; its ends roll slowly over the wall."""
+    scene = layer(9.0, erosion("thickness squared", 0.01), "growth.until=steady", 'growth.steady_tolerance="5e-3 1/h"',
+                  'growth.end="40 h"', 'output.times=["40 h"]', "numerics.refinement=0.1")
+    reports, status = run(scene)
+    time = reports[-1].pore.time
+    assert status.startswith(f"the aggregates are steady at t = {time:g} h") and 10 < time < 40
+    assert middle_thickness(reports[-1].pore) == pytest.approx(reference.layer(9.0, MU, 0.01, time), rel=1e-3)
+
+
+def test_no_state_is_steady_before_the_last_time_of_a_table():
+    scene = growing_disc(10.0, erosion("constant", 0.5), 'growth.end="2 h"', "growth.until=steady",
+                         'output.times=["2 h"]',
+                         'substrates.donor.supply=[["0 h", "10 mg/L"], ["1 h", "12 mg/L"]]')
+    reports, status = run(scene)
+    assert status.startswith("the aggregates are steady") and reports[-1].pore.time > 1.0
+
+
+def test_a_run_restarts_after_an_eroding_step_with_the_same_bits():
+    scene = growing_disc(10.0, erosion("thickness squared", 0.01), 'growth.end="4 h"', 'output.times=["4 h"]',
+                         "numerics.refinement=0.1")
+    states = [state for state, _ in simulation.steps(scene)]
+    plain, arrays = pack_state(scene, states[1])
+    again = [state for state, _ in simulation.steps(scene, unpack_state(scene, plain, arrays))]
+    assert len(states) > 3 and len(again) == len(states) - 2
+    assert np.array_equal(again[-1].pore.mesh.points, states[-1].pore.mesh.points)
+    assert [each.detached for state in again for each in state.ledgers] == [
+        each.detached for state in states[2:] for each in state.ledgers]
+
+
+def test_a_step_that_erodes_a_contact_surface_ends_the_run():
+    """The lines of the upper contact surface would pass each other."""
+    scene = shaped(erosion("constant", 0.5), 'pore.width="8 um"', 'aggregate.outline=[["-6 um", "0 um"], '
+                   '["-0.5 um", "8 um"], ["0.5 um", "8 um"], ["6 um", "0 um"]]')
+    stages, pore = Stages.of(scene), seeded(scene)
+    status = "erosion takes a contact surface at y = 8 um in the step from t = 0 h"
+    with pytest.raises(repro.Detachment, match=f"^{status}$"):
+        eroding.attempt(stages, pore, stages.solver.solve(pore), 2.0)
+    assert is_over(status)
+
+
+@pytest.mark.thorough
+def test_an_aggregate_on_both_walls_erodes_until_its_upper_contact_is_gone():
+    """It touches the upper wall by growth. Erosion removes more than growth adds, at both walls."""
+    scene = load_scene("base", ["numerics.preset=fast", "growth.new_biomass=stress_free", 'pore.width="12 um"',
+                                'aggregate.radius="9 um"', 'growth.end="60 h"', 'output.times=["60 h"]',
+                                erosion("thickness squared", 5e-4)])
+    lengths = []
+    with pytest.raises(repro.Detachment, match="erosion takes a contact surface at y = 12 um"):
+        for state, _ in simulation.steps(scene):
+            lengths.append(state.pore.boundary.contact_length(state.pore.mesh.walls[1]))
+    contact = [length for length in lengths if length > 0]
+    assert contact[0] > 2.0 and contact == sorted(contact, reverse=True) and contact[-1] < 1e-3
+
+
+@pytest.mark.parametrize("changes, message", [
+    (("numerics.preset=paper",), "growth.erosion"),
+    (("growth.new_biomass=stressed",), "growth.new_biomass = 'stressed'|\"stress_free\" is needed"),
+    (('growth.erosion.speed="1 um/h"', "growth.erosion.law=shear"), "growth.erosion"),
+    (('growth.erosion.critical_shear="1 Pa"',), "\"shear\" is needed|growth.erosion.law = \"shear\" is needed"),
+    (('growth.erosion.thickness_coefficient="1 1/um/h"',), "is needed")])
+def test_scenes_without_a_model_of_erosion_are_refused(changes, message):
+    with pytest.raises(SceneError, match=message):
+        load_scene("base", ["numerics.preset=fast", "growth.new_biomass=stress_free", erosion("constant", 0.1),
+                            *changes])
+
+
+@pytest.mark.parametrize("law", ["constant", "thickness squared", "shear"])
+def test_each_law_needs_its_key(law):
+    with pytest.raises(SceneError, match="is missing|needed with"):
+        load_scene("base", ["numerics.preset=fast", "growth.new_biomass=stress_free",
+                            f'growth.erosion={{law="{law}"}}'])
