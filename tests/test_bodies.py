@@ -17,7 +17,7 @@ from repro.fem.space import Space
 from repro.fem.walls import BOTTOM, TOP, channel_walls
 from repro.march import balance, folding, loop, midpoint, updates
 from repro.march import stepping as midpoint_steps
-from repro.march.ends import Detachment, Meeting
+from repro.march.ends import Detachment, Meeting, PoreEnd
 from repro.march.state import Compression, RestartState, contiguous
 from repro.march.step_control import StepControl
 from repro.model import adhesion, contact, growing, mesh_motion, meshing
@@ -249,6 +249,13 @@ def test_two_aggregates_that_meet_end_the_run_there(order, opposite):
     assert len(films) > 1 and min(films[:-1]) > 4.0 and films[-1] == pytest.approx(4.0, rel=2e-4)
 
 
+@pytest.mark.parametrize("side, x", [("upstream", -292.5), ("downstream", 292.5)])
+def test_the_end_of_the_pore_names_the_aggregate_that_reaches_it(side, x):
+    scene = load_scene("base", ["numerics.preset=fast", 'growth.end="1 h"'])
+    with pytest.raises(PoreEnd, match=f"^aggregate 2 reaches the pore's {side} end at t = 0 h"):
+        list(started(scene, (5.0, 20.0, BOTTOM), (5.0, x, TOP), (5.0, -20.0, BOTTOM)))
+
+
 @pytest.mark.parametrize("transport", ["quasi_steady", "gear"])
 @pytest.mark.parametrize("preset", ["paper", "fast"])
 def test_an_aggregate_that_detaches_leaves_the_pore_with_its_mass(preset, transport):
@@ -266,6 +273,8 @@ def test_an_aggregate_that_detaches_leaves_the_pore_with_its_mass(preset, transp
     ledgers = [ledger for report in reports for ledger in report.ledgers]
     left = [ledger for ledger in ledgers if ledger.detached]
     assert len(left) == 2
+    messages = [message.partition(" at t = ")[0] for report in reports for message in report.departed]
+    assert messages == ["aggregate 2 detaches", "the aggregate detaches"]
     for ledger in ledgers:
         after = ledger.biomass_after + ledger.detached
         assert after == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-9)

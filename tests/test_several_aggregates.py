@@ -527,3 +527,17 @@ def test_a_front_in_one_of_two_bodies_gets_finer_elements():
         solving.solve(scene, start)
     pore, _ = Grading.of(scene).solve(start)
     assert pore.front == 2 and np.array_equal(pore.mesh.points, seeded(scene, 2.0).mesh.points)
+
+
+def test_a_folder_says_which_aggregates_left(tmp_path, capsys):
+    """The run goes on without them. Its end says nothing of them, so that a warning of the run names each."""
+    changes = ["numerics.preset=fast", "numerics.refinement=0.15", 'growth.end="1 h"', "growth.wall=bonded",
+               'growth.bonding_strength="4e-4 MPa"', "growth.after_detachment=continue", "output.every=1 h",
+               'aggregate=[{radius="8 um", position="-60 um", name="first"}, {radius="5 um", position="60 um"}]']
+    arguments = [part for change in changes for part in ("--set", change)]
+    assert main(["run", "base", "--out", str(tmp_path / "run"), *arguments]) == 0
+    written = capsys.readouterr().err
+    recorded = json.loads((tmp_path / "run" / "run.json").read_text())
+    left = [warning["text"] for warning in recorded["warnings"] if warning["key"] == "growth.after_detachment"]
+    assert [text.partition(" at t = ")[0] for text in left] == ["aggregate first detaches", "aggregate 2 detaches"]
+    assert recorded["status"] == "completed" and all(text in written for text in left)

@@ -241,7 +241,8 @@ def _extents(outline: Outline) -> tuple[float, float, float]:
 def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
     """All ends that the scene models."""
     for side in ("upstream", "downstream"):
-        end = PoreEnd(f"the aggregate reaches the pore's {side} end at t = {pore.time:g} h")
+        nearest = name_of(pore, farthest(pore, side)) if pore.bodies else ""
+        end = PoreEnd(f"{nearest} reaches the pore's {side} end at t = {pore.time:g} h")
         yield Event(1 - elements_to_end(ends.channel, pore, side), end)
     if pore.accumulates and pore.biot > 0:
         compression = most_compressed(Compression(), pore)
@@ -304,11 +305,21 @@ def name_of(pore: Pore, number: int) -> str:
     return "the aggregate" if len(pore.bodies) == 1 and name == "1" else f"aggregate {name}"
 
 
+def farthest(pore: Pore, side: str) -> int:
+    """Place in the list of the aggregate that is nearest to an end of the pore."""
+    return int(np.argmax(_tips(pore, side)))
+
+
 def elements_to_end(channel: Channel, pore: Pore, side: str) -> float:
     """Distance of the nearest aggregate from an end of the pore, in elements of the fluid."""
-    tip = max((-outline.upstream if side == "upstream" else outline.downstream
-               for outline in pore.outlines), default=-inf)
+    tip = max(_tips(pore, side), default=-inf)
     return (channel.length / 2 - tip) * ACROSS_PORE / channel.width
+
+
+def _tips(pore: Pore, side: str) -> list[float]:
+    """Distance (um) of each aggregate's tip from the middle of the pore, towards an end."""
+    return [-outline.upstream if side == "upstream" else outline.downstream
+            for outline in pore.outlines]
 
 
 def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
@@ -322,7 +333,8 @@ def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
             raise Meeting(f"{pair} meet in the step from t = {previous.time:g} h")
     for side in ("upstream", "downstream"):
         if elements_to_end(channel, expanded, side) < LEAST_ELEMENTS:
-            raise PoreEnd(f"the aggregate reaches the pore's {side} end in the step from "
+            nearest = name_of(expanded, farthest(expanded, side))
+            raise PoreEnd(f"{nearest} reaches the pore's {side} end in the step from "
                           f"t = {previous.time:g} h")
 
 

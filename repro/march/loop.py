@@ -169,6 +169,7 @@ def _grow(course: Course, state: RestartState,
         if course.every_step or row is not None or detached or event.margin > 0:
             reported = pore if row is None else replace(pore, time=row)
             report = make_report(state, reported, solved, step.before, shown)
+            report = replace(report, departed=step.departed)
             shown = pore.mesh.topology
             state = mark_reported(state, pore.time)
             yield state, report
@@ -214,7 +215,9 @@ def _after_detachment(stages: Stages, reached: Reached,
     after, solved = settle(stages, *stages.grading.solve(remaining))
     ledger = replace(step.ledger, biomass_after=step.ledger.biomass_after - mass,
                      detached=step.ledger.detached + mass)
-    return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
+    departed = (*step.departed, str(reached.event.end))
+    return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True,
+                   departed=departed), solved
 
 
 def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepResult, Solved]:

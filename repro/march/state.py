@@ -56,6 +56,8 @@ class Report:
         Newton iterations since the last report, by stage.
     new_mesh : bool
         Is the mesh another one than in the last report?
+    departed : tuple of str
+        How aggregates left the pore at this time, while the run goes on.
     """
 
     pore: Pore
@@ -65,6 +67,7 @@ class Report:
     remeshes: int
     iterations: dict[str, int]
     new_mesh: bool = False
+    departed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,8 @@ class InterpolatedState:
 class StepResult:
     """Result of one step: the new pore, pore and solution before the expansion, and the ledger.
 
-    within: interpolates the state to a time (h) within the step.
+    within: interpolates the state to a time (h) within the step; departed: how aggregates left the
+    pore at its end.
     """
 
     pore: Pore
@@ -89,6 +93,7 @@ class StepResult:
     remeshed: bool
     iterations: int
     within: Callable[[float], InterpolatedState]
+    departed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

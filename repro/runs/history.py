@@ -21,7 +21,8 @@ class History:
     warnings: ``key`` of the scene and ``text`` of each simplification that does not hold; surface:
     the same for creases, and for positions at t = 0 that fold; missed: number of steps that do not
     meet the tolerance; worst: the largest of their error estimates; missing: time (h) of each row
-    that cannot be computed, and the reason.
+    that cannot be computed, and the reason; departed: how aggregates left the pore while the run
+    went on.
     """
 
     rows: Table = field(default_factory=list)
@@ -39,6 +40,7 @@ class History:
     missed: int = 0
     worst: float = 0.0
     missing: list[tuple[float, str]] = field(default_factory=list)
+    departed: list[str] = field(default_factory=list)
 
 
 #: The counts and times in ``run.json``; ``value`` takes a History.

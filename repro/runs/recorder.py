@@ -107,6 +107,7 @@ class Recorder:
             self.history.ledgers += self._ledger_rows(reported.ledgers)
             self.history.remeshes += int(reported.remeshes)
             self.history.iterations = sum_counts(self.history.iterations, reported.iterations)
+            self.history.departed += reported.departed
         if state.missing and state.missing not in self.history.missing:  # not before a resume
             self.history.missing.append(state.missing)
         if self.state and state.step_control != self.state.step_control:
@@ -130,11 +131,13 @@ class Recorder:
             self.history.worst = max(self.history.worst, step_control.estimate)
 
     def warnings_so_far(self) -> list[Caveat]:
-        """Warn if any step so far misses the tolerance, if any row is missing, and of each
-        simplification that holds at t = 0 and not at the present size."""
+        """Warn if any step so far misses the tolerance, if any row is missing or an aggregate has
+        left, and of each simplification that holds at t = 0 and not at the present size."""
         count = f" in {self.history.missed} of {self.steps} steps"
         return [*warn_missed_tolerance(self.scene, self.history.worst, count),
-                *warn_missing_rows(self.history.missing), *self._warn_of_growth()]
+                *warn_missing_rows(self.history.missing),
+                *(Caveat("growth.after_detachment", text) for text in self.history.departed),
+                *self._warn_of_growth()]
 
     def _warn_of_growth(self) -> list[Caveat]:
         if self.scene.growth is None or not (self.state and self.history.rows):
