@@ -17,6 +17,7 @@ Functions; every argument after these is given by its name:
 
     load_scene(scene, overrides)            a scene: sections, keys, units
     check(scene, overrides)                 its model, mesh, numbers, warnings and cost
+    error(scene, overrides)                 its change on a finer mesh, column by column
     solve(scene, overrides)                 Results in memory
     run(scene, folder, overrides)           the same Results, written to a folder
     resume(folder, overrides)               continue a run, or extend it to a later end
@@ -104,6 +105,7 @@ if TYPE_CHECKING:
     from repro.network.resistance import added_resistance
     from repro.network.uptakes import uptake
     from repro.preflight.checked import check
+    from repro.preflight.refined import error
     from repro.report import compare
     from repro.results.tables import Results, solve
     from repro.runs.scripts import load_run, resume, run
@@ -121,7 +123,8 @@ else:
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "Steady": "march.ends",
                 "added_resistance": "network.resistance", "check": "preflight.checked",
-                "compare": "report", "load_run": "runs.scripts", "load_scene": "scene",
+                "compare": "report", "error": "preflight.refined",
+                "load_run": "runs.scripts", "load_scene": "scene",
                 "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",
                 "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "network.uptakes"}
 
@@ -136,5 +139,5 @@ else:
         return sorted(_MODULES)
 
 #: ``help`` lists these; errors are in the text above, so that functions come before them.
-__all__ = ["Results", "Scene", "added_resistance", "check", "compare", "load_run", "load_scene",
-           "resume", "run", "simulate", "solve", "sweep", "uptake"]
+__all__ = ["Results", "Scene", "added_resistance", "check", "compare", "error", "load_run",
+           "load_scene", "resume", "run", "simulate", "solve", "sweep", "uptake"]

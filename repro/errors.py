@@ -13,7 +13,8 @@ from contextlib import contextmanager
 #: Arguments of Python for options of the command line; others have the name of the option.
 ARGUMENTS = {"--out": "folder", "--set": "overrides", "--force": "force=True",
              "--resume": "repro.resume"}
-OPTION = re.compile(r"(?<![\w'\"-])--(?:out|set|unset|force|resume|vary|samples|seed|scheduler)\b")
+OPTION = re.compile(r"(?<![\w'\"-])--(?:out|set|unset|force|resume|vary|samples|seed|scheduler|"
+                    r"limit)\b")
 
 
 def printable(text: str) -> str:

@@ -25,7 +25,7 @@ def options_of(command):
 
 #: Functions of Python with the parameters that a command has as options.
 FUNCTIONS = {"sweep": [repro.sweep, run_plan], "run": [Watch, repro.run, repro.resume], "plot": [repro.Results.plot],
-             "check": [repro.check], "compare": [repro.compare]}
+             "check": [repro.check, repro.error], "compare": [repro.compare]}
 #: Parameters that are options of another name.
 NAMES = {"interval": "checkpoint"}
 

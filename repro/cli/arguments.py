@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from repro.scene import packaged_scenes
@@ -20,6 +21,14 @@ def path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("a path is needed, this one is empty")
     return Path(text)
+
+
+def seconds(text: str) -> float:
+    """Parse a number of seconds, zero or more."""
+    value = float(text)
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: a number of seconds, zero or more, is needed")
+    return value
 
 
 def add_changes(command) -> None:

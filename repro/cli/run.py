@@ -6,11 +6,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from repro.cli.arguments import add_scene, path
+from repro.cli.arguments import add_scene, path, seconds
 from repro.errors import SimulationError
 from repro.runs import INTERVAL, interrupts, progress
 from repro.scene import Scene, load_scene
@@ -47,20 +46,13 @@ def add(commands) -> None:
                          help="resume the run in this folder")
     command.add_argument("--force", action="store_true",
                          help="remove the files that the run.json in DIR lists, and start again")
-    command.add_argument("--checkpoint", metavar="SECONDS", type=_seconds, default=INTERVAL,
+    command.add_argument("--checkpoint", metavar="SECONDS", type=seconds, default=INTERVAL,
                          help="wall time after which a checkpoint and the results so far are "
                          "written again (default: %(default)g)")
     command.add_argument("--quiet", action="store_true", help="print only warnings and errors")
     command.add_argument("--json", action="store_true",
                          help="print each event as one line of JSON")
     command.set_defaults(call=call, refuse=command.error)
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: a number of seconds, zero or more, is needed")
-    return value
 
 
 def call(options) -> int:

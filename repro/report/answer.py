@@ -12,9 +12,6 @@ from repro.results import field_files, names
 from repro.results.columns import DETACHED
 from repro.results.field_files import Grid
 
-#: The columns of the table, if the run has them.
-SHOWN = ("conductivity_m_per_d", "aggregate_area_um2", "thickness_um", "effluent_acceptor_mg_per_L",
-         "effluent_donor_mg_per_L")
 #: Rows of the table, and outlines in the picture, without a row for the contact.
 SEVERAL = 5
 #: A relative change that the sentence does not name.
@@ -91,7 +88,7 @@ def _short(value: float) -> str:
 
 
 def _columns(run: Run) -> list[str]:
-    return [name for name in SHOWN if np.isfinite(run.series.get(name, np.nan)).any()]
+    return [name for name in names.ANSWER if np.isfinite(run.series.get(name, np.nan)).any()]
 
 
 def _rows(run: Run) -> list[list[str]]:

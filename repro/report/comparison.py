@@ -15,8 +15,6 @@ from repro.scene.units import alike
 
 #: A value of this many times another one is not a percentage any more.
 TIMES = 10.0
-#: Columns without a value between rows, and defects, which are round-off.
-NOT_COMPARED = {"time_h", "nodes", *names.DEFECTS, *names.YES_NO}
 
 
 def build(runs: Sequence[Run]) -> str:
@@ -85,7 +83,8 @@ def common_time(runs: Sequence[Run]) -> float | None:
 
 def values(runs: Sequence[Run], time: float) -> dict[str, list[float | None]]:
     """The value of each column in each run at a time (h), linear between rows; None if unknown."""
-    columns = dict.fromkeys(name for run in runs for name in run.series if name not in NOT_COMPARED)
+    columns = dict.fromkeys(name for run in runs for name in run.series
+                            if name not in names.NOT_COMPARED)
     return {name: _in_each(runs, name, time) for name in columns}
 
 

@@ -20,6 +20,11 @@ COORDINATES = ("stream_um", "_x_um", "_y_um")
 YES_NO = {name for name, quantity in KNOWN.items() if quantity.yes_no}
 #: Relative defects of balances.
 DEFECTS = {name for name in KNOWN if name.endswith("_balance")}
+#: Columns without a value between rows, and defects, which are round-off.
+NOT_COMPARED = {"time_h", "nodes", *DEFECTS, *YES_NO}
+#: The columns that answer what becomes of a pore.
+ANSWER = ("conductivity_m_per_d", "aggregate_area_um2", "thickness_um",
+          "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
 
 
 def known(name: str) -> Quantity | None:

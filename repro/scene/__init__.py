@@ -17,6 +17,7 @@
 from repro.scene.files import packaged_scenes
 from repro.scene.former import without_former
 from repro.scene.keys import (
+    FINER,
     KEYS,
     NOT_IN_PAPER,
     PRESETS,
@@ -45,8 +46,8 @@ from repro.scene.needed import MissingError, needed
 from repro.scene.time_table import TimeTables, at_largest, at_time
 from repro.scene.units import SceneError, Stated
 
-__all__ = ["KEYS", "NOT_IN_PAPER", "PRESETS", "Acceptor", "Aggregate", "Donor", "Erosion", "Flow",
-           "Growth", "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene",
+__all__ = ["FINER", "KEYS", "NOT_IN_PAPER", "PRESETS", "Acceptor", "Aggregate", "Donor", "Erosion",
+           "Flow", "Growth", "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene",
            "SceneError", "Source", "Stated", "Substrate", "Substrates", "TimeTables", "at_largest",
            "at_time", "label", "load_scene", "load_tables", "needed", "packaged_scenes",
            "parse_scene", "scene_hash", "scene_tables", "without_former"]

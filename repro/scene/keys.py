@@ -489,6 +489,8 @@ PRESETS: dict[str, dict[str, Any]] = {
     "as_printed": {"transport": "gear"},
     "sketch": {"refinement": 0.05, "tolerance": 0.01},
 }
+#: The next finer preset of a preset, if there is one.
+FINER = {"sketch": "fast", "fast": "accurate", "accurate": "exact"}
 
 
 @dataclass(frozen=True)

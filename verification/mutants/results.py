@@ -16,6 +16,7 @@ STEPPING = "tests/test_stepping.py::test_"
 NOT_MET = "tests/test_warned.py::test_a_missed_tolerance_is_reported_with_the_largest_estimate"
 ODD = "tests/test_odd_outlines.py::test_"
 CHECK = "tests/test_check.py::test_"
+FINER = "tests/test_finer.py::test_"
 ADVICE = "tests/test_advice.py::test_"
 BEFORE_END = f"{STEPPING}steps_and_rows_before_the_end_do_not_depend_on_it[fast-0.55]"
 GEAR = "tests/test_gear.py::test_"
@@ -2711,4 +2712,30 @@ MUTANTS = (
          "width = whole_width(channel_walls(channel.width, upper=channel.upper_wall))",
          "width = channel.width",
          f"{WALLS}expected_numbers_are_those_of_the_pore_with_its_mirror_image[symmetry]")),
+    *changes(
+        "repro/preflight/refined.py",
+        ("finer-run-with-the-same-steps",
+         "The finer run of the paper's scheme has the same time step.",
+         "refine",
+         "step = scene.growth.time_step / FACTOR**2",
+         "step = scene.growth.time_step",
+         f"{FINER}the_finer_run_has_the_next_preset_or_smaller_elements_and_steps[paper]"),
+        ("coarser-where-already-finer",
+         "The finer run takes the next preset, also where the scene is finer than it.",
+         "refine",
+         "following if (following - own) * (factor - 1) > 0 else own * factor",
+         "following if following != own else own * factor",
+         f"{FINER}a_key_that_is_as_fine_as_the_next_preset_is_refined_too"),
+        ("last-difference",
+         "A difference is that of the last row instead of the largest one.",
+         "_largest",
+         "k = int(change.argmax())",
+         "k = len(change) - 1",
+         f"{FINER}a_difference_has_its_scale"),
+        ("one-run-first",
+         "The scene's own run comes to its end before the finer one begins.",
+         "_behind",
+         "behind = min(own, finer, key=lambda run: run.time)",
+         "behind = own if own.stopped is None else finer",
+         f"{FINER}runs_are_compared_as_far_as_the_time_allows")),
 )

@@ -1,0 +1,299 @@
+"""Compare a run with a finer one of the same scene: is the mesh fine enough?
+
+The finer run has the next preset. ``exact`` and the presets of the paper's scheme have none: their
+elements and steps are divided. A key of [numerics] that is already as fine as the next preset is
+refined by the same factor.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from time import process_time
+
+import numpy as np
+
+from repro import results
+from repro.errors import RunEnd, SimulationError, StageError
+from repro.march.simulation import steps
+from repro.march.state import SAME_TIME
+from repro.model.meshing import MOST_REFINED
+from repro.polling import polling
+from repro.preflight.memory import require_memory, require_outline
+from repro.results import names
+from repro.scene import FINER, PRESETS, Scene, SceneError, Source, label, load_scene
+from repro.scene.arguments import Overrides, typed
+
+#: Processor time (s) of both runs together. Base to 19.4 h needs 5 s in fast, 52 s in paper.
+LIMIT = 120.0
+#: Divides the elements of a scene without a finer preset. It has FACTOR^2 times the nodes.
+FACTOR = 1.5
+#: What a finer key of [numerics] is multiplied by. The error of a midpoint step of length h, which
+#: the tolerance limits, is of order h^2.
+FACTORS = {"refinement": FACTOR, "tolerance": FACTOR**-2, "contact_elements": FACTOR}
+#: Intervals between rows, if the scene requests no times.
+INTERVALS = 24
+WIDTH = 110
+
+
+class _OutOfTime(Exception):
+    """The processor time of both runs is over."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Largest difference of a column between both runs.
+
+    difference: in %, or in um for a coordinate; time: h, where it is; own, finer: both values then,
+    in the unit of the column's name.
+    """
+
+    column: str
+    difference: float
+    unit: str
+    time: float
+    own: float
+    finer: float
+
+
+@dataclass(frozen=True)
+class FinerComparison:
+    """Result of :func:`error`; ``print`` shows it.
+
+    own, finer: what is solved, in words; time: h, of the last common row; rows: number of common
+    rows; stopped: why it compares no later rows, empty at the end of the scene; seconds: processor
+    time of both runs; limit: its limit.
+    """
+
+    scene: str
+    own: str
+    finer: str
+    time: float
+    rows: int
+    stopped: str
+    seconds: float
+    limit: float
+    differences: list[Difference]
+
+    @property
+    def sentence(self) -> str:
+        """A sentence that a paper may quote."""
+        answers = [each for each in self.differences if each.column in names.ANSWER]
+        changes = [f"the {names.words(each.column)} changes by at most {each.difference:.2g} "
+                   f"{each.unit}" for each in answers or self.differences]
+        span = f"From t = 0 to {self.time:.4g} h" if self.time else "At t = 0"
+        return (f"{span}, {', '.join(changes)} if the numerics change from {self.own} to "
+                f"{self.finer}.")
+
+    def tables(self) -> dict:
+        """Return the result as a dict for JSON."""
+        return {**asdict(self), "sentence": self.sentence}
+
+    def __str__(self) -> str:
+        reason = self.stopped or "the end of the scene"
+        heading = (f"{self.scene}: {self.own} compared with {self.finer}, {self.rows} common rows "
+                   f"to t = {self.time:.4g} h: {reason} ({self.seconds:.2g} s of processor time, "
+                   f"at most {self.limit:g} s)")
+        return "\n".join([*textwrap.wrap(heading, WIDTH, subsequent_indent="  "), "",
+                          f"{'Largest difference':48}{'at t (h)':>10}{'own':>12}{'finer':>12}",
+                          *map(_line, self.differences), "",
+                          *textwrap.wrap(self.sentence, WIDTH), "",
+                          "This is the change of the results, and no bound of their error."])
+
+
+def _line(each: Difference) -> str:
+    change = f"{each.difference:.2g} {each.unit}"
+    return (f"  {each.column:34}{change:>12}{each.time:>10.4g}{each.own:>12.5g}"
+            f"{each.finer:>12.5g}")
+
+
+@typed
+def error(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
+          limit: float = LIMIT) -> FinerComparison:
+    """Compare a run of a scene with a finer run, to see whether its mesh is fine enough.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path or dict
+        A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
+    overrides : sequence of str or dict, optional
+        Changes of the scene, as for :func:`repro.load_scene`.
+    unset : sequence of str, optional
+        Keys or sections of the scene to leave out.
+    limit : float, optional
+        Processor time (s) of both runs together. They are compared as far as they come.
+
+    Returns
+    -------
+    FinerComparison
+        The largest difference of each column over the common rows, in % (um for coordinates), with
+        its time (h), and a sentence that a paper may quote. ``print`` shows it.
+
+    Raises
+    ------
+    SceneError
+        If the scene is not accepted, if there is no common row, as after a failure at t = 0, or if
+        the finer run would need more than the free memory.
+
+    Notes
+    -----
+    The runs have the presets ``sketch`` and ``fast``, ``fast`` and ``accurate``, or ``accurate``
+    and ``exact``. For the other presets the finer run has elements of 2/3 the size, and a tolerance
+    or a ``growth.time_step`` smaller in proportion to the expected error. Rows are at the scene's
+    requested times, or at 25 evenly spaced ones. A difference is relative to the value of the finer
+    run in the same row. For columns that may be negative, and where that value is zero, it is
+    relative to the largest value of both runs.
+
+    Examples
+    --------
+    >>> import repro
+    >>> compared = repro.error("base", {"growth.end": "0.1 h", "numerics.preset": "sketch"})
+    >>> compared.time, compared.rows, compared.stopped
+    (0.1, 25, '')
+    """
+    loaded = load_scene(scene, overrides, unset=unset)
+    return compare_with_finer(loaded, label(scene), limit, lambda _: None)
+
+
+def compare_with_finer(scene: Scene, file: str, limit: float,
+                       report: Callable[[float], None]) -> FinerComparison:
+    """Compare the runs of a loaded scene, as :func:`error` does.
+
+    file: its name in messages; report: receives each time (h) that both runs have reached.
+    """
+    if not limit > 0:
+        raise SceneError(f"--limit {limit:g}: a number of seconds, more than zero, is needed")
+    finer = refine(scene)
+    require_outline(scene)
+    require_memory(finer, lambda _: None)
+    own, other = _Run("own", scene), _Run("finer", finer)
+    begun = process_time()
+    stopped = _advance_both(own, other, limit, report)
+    common = _common_rows(own, other)
+    if not common:
+        raise SceneError(f"{file}: no row to compare: {stopped}")
+    time = common[-1][0]
+    return FinerComparison(scene.name, _describe(scene), _describe(finer), time, len(common),
+                           stopped, process_time() - begun, limit, _largest_differences(common))
+
+
+def refine(scene: Scene) -> Scene:
+    """Return the scene with finer numerics, and the same times of rows."""
+    numerics = scene.numerics
+    preset = FINER.get(numerics.preset, numerics.preset)
+    refined = {}
+    for key, factor in FACTORS.items():
+        own = getattr(numerics, key)
+        following = PRESETS[preset].get(key, own)
+        refined[key] = following if (following - own) * (factor - 1) > 0 else own * factor
+    refined["refinement"] = min(refined["refinement"], MOST_REFINED)
+    finer = replace(scene, numerics=replace(numerics, preset=preset, **refined))
+    if scene.growth and not numerics.scheme.controls_error:
+        step = scene.growth.time_step / FACTOR**2  # the error of an update is of order time_step
+        finer = replace(finer, growth=replace(scene.growth, time_step=step))
+    return finer
+
+
+def _describe(scene: Scene) -> str:
+    """Preset and numbers of a scene that the finer one changes."""
+    numerics = scene.numerics
+    step = ""
+    if scene.growth:
+        step = f", tolerance {numerics.tolerance:.3g}" if numerics.scheme.controls_error else \
+            f", time step {scene.growth.time_step:.3g} h"
+    return f"{numerics.preset} (refinement {numerics.refinement:.3g}{step})"
+
+
+def _with_rows(scene: Scene) -> Scene:
+    """Return the scene with rows at its requested times, or at evenly spaced ones."""
+    if scene.growth is None:
+        return scene
+    end = scene.growth.end
+    times = scene.output.requested(end) or np.linspace(0.0, end, INTERVALS + 1).tolist()
+    return replace(scene, output=replace(scene.output, times=tuple(times), every=None))
+
+
+class _Run:
+    """A run, step by step. time: h, that it has reached; rows: (time, columns)."""
+
+    def __init__(self, name: str, scene: Scene):
+        self.name = name
+        self.time = -1.0
+        self.rows: list[tuple[float, dict[str, float | None]]] = []
+        self.stopped: str | None = None
+        self._steps = self._advance(_with_rows(scene))
+
+    def _advance(self, scene: Scene) -> Iterator[None]:
+        for state, row in steps(scene):
+            if row:
+                self.rows.append((row.pore.time, results.row(scene, row)))
+            self.time = state.pore.time
+            yield
+
+    def step(self) -> None:
+        """Make a step; ``stopped`` is why there is no other one, empty at the scene's end."""
+        try:
+            next(self._steps)
+        except StopIteration:
+            self.stopped = ""
+        except RunEnd as end:
+            self.stopped = f"the {self.name} run ends: {end}"
+        except (SimulationError, StageError, ArithmeticError) as failure:
+            self.stopped = f"the {self.name} run fails: {failure.__cause__ or failure}"
+
+
+def _advance_both(own: _Run, finer: _Run, limit: float, report: Callable[[float], None]) -> str:
+    """Advance both runs side by side, as far as both come; return why they stop, "" at the end."""
+    deadline = process_time() + limit
+
+    def check() -> None:
+        if process_time() > deadline:
+            raise _OutOfTime
+
+    try:
+        with polling(check):
+            while behind := _behind(own, finer):
+                check()
+                behind.step()
+                report(max(0.0, min(own.time, finer.time)))
+    except _OutOfTime:
+        return f"the {limit:g} s are over"
+    return "; ".join(filter(None, (own.stopped, finer.stopped)))
+
+
+def _behind(own: _Run, finer: _Run) -> _Run | None:
+    """Return the run to advance: the one that has not passed the other, unless it has stopped."""
+    behind = min(own, finer, key=lambda run: run.time)
+    return behind if behind.stopped is None else None
+
+
+def _common_rows(own: _Run, finer: _Run) -> list[tuple[float, dict, dict]]:
+    """Return the time (h) and both rows of each time at which both runs have one."""
+    return [(time, row, other) for time, row in own.rows for later, other in finer.rows
+            if abs(later - time) <= SAME_TIME]
+
+
+def _largest_differences(common: list[tuple[float, dict, dict]]) -> list[Difference]:
+    """Return the largest difference of each column that both runs have."""
+    computed = []
+    for name in common[0][1]:
+        values = np.array([(time, own[name], finer[name]) for time, own, finer in common], float)
+        values = values[np.isfinite(values).all(axis=1)]
+        if len(values) and name not in names.NOT_COMPARED:
+            computed.append(_largest(name, *values.T))
+    return computed
+
+
+def _largest(name: str, times: np.ndarray, own: np.ndarray, finer: np.ndarray) -> Difference:
+    quantity = names.known(name)
+    change, unit = np.abs(own - finer), "um"
+    if not name.endswith(names.COORDINATES):
+        unit = "%"
+        scale = np.abs(finer)
+        largest = max(np.abs(own).max(), scale.max()) or 1.0
+        signed = quantity is not None and quantity.signed
+        change = 100 * change / np.where((scale == 0) | signed, largest, scale)
+    k = int(change.argmax())
+    difference, time, first, second = (float(each[k]) for each in (change, times, own, finer))
+    return Difference(name, difference, unit, time, first, second)
