@@ -23,7 +23,7 @@ Functions; every argument after these is given by its name:
     resume(folder, overrides)               continue a run, or extend it to a later end
     load_run(folder)                        Results of a run in a folder
     compare(folders, file)                  a page that compares runs
-    sweep(scene, vary, folder, overrides)   runs with varied keys, their tables and page
+    sweep(scene, vary, folder, overrides)   runs with varied keys or own points, tables and page
     simulate(scene, overrides)              the full state at every row, in um, h, mg/L
     added_resistance(area, width, spanned)  resistance of an aggregate in a throat
     uptake(area, width, velocity, acceptor, donor)  of both substrates by an aggregate in a throat

@@ -67,7 +67,7 @@ def test_every_run_has_its_folder_and_a_failure_is_recorded(finished):
     assert sorted(finished.glob("runs/*")) == [finished / point["folder"] for point in record["points"]]
     runs = rows(finished / "runs.csv")
     assert [row["run"] for row in runs] == ["1", "2", "3"]
-    assert [row["flow.mean_velocity_m_per_day"] for row in runs] == ["2.9", "1e-12", "5.8"]
+    assert [row["flow.mean_velocity_m_per_d"] for row in runs] == ["2.9", "1e-12", "5.8"]
     assert [row["status"].partition(":")[0] for row in runs] == ["completed", "failed", "completed"]
     assert "transport" in runs[1]["status"] and "Peclet" in runs[1]["status"]
     assert not (finished / runs[1]["folder"] / "run.json").exists(), "its first state fails: nothing is written"
@@ -81,7 +81,7 @@ def test_the_table_equals_those_of_the_runs(finished):
         computed = [row for row in table_rows if row["run"] == run["run"]]
         names = results.column_names(repro.load_scene("base"))
         assert [dict(zip(names, map(row.get, names))) for row in computed] == expected
-        assert {row["flow.mean_velocity_m_per_day"] for row in computed} <= {run["flow.mean_velocity_m_per_day"]}
+        assert {row["flow.mean_velocity_m_per_d"] for row in computed} <= {run["flow.mean_velocity_m_per_d"]}
     assert len(table_rows) > 3
 
 
@@ -189,10 +189,11 @@ def test_the_table_of_the_page_agrees_with_the_runs(finished):
     for line, run in zip(lines, rows(finished / "runs.csv"), strict=True):
         cells = dict(zip(names, (re.sub("<.*?>", "", cell) for cell in re.findall("<td.*?</td>", line)), strict=True))
         end, wall = (run[column] and f"{float(run[column]):.4g}" for column in ("end_h", "wall_time_s"))
-        expected = {"run": run["run"], "flow.mean_velocity": f"{run['flow.mean_velocity_m_per_day']} m/day",
-                  "end (h)": end, "wall time (s)": wall, "clogged (h)": "", "contact (h)": "",
+        expected = {"run": run["run"], "flow.mean_velocity": f"{run['flow.mean_velocity_m_per_d']} m/day",
+                  "end (h)": end, "wall time (s)": wall,
+                  "conductivity (m/day)": run["conductivity_m_per_d"] and f"{float(run['conductivity_m_per_d']):.4g}",
                   "status": run["status"].partition(":")[0]}
-        assert {name: cells[name] for name in expected} == expected
+        assert {name: cells[name] for name in expected} == expected and "contact (h)" not in cells
 
 
 def test_rows_have_the_inputs_of_their_runs(tmp_path, monkeypatch):
@@ -208,10 +209,10 @@ def test_rows_have_the_inputs_of_their_runs(tmp_path, monkeypatch):
         scene = read_record(out / one["folder"])["tables"]
         assert float(row["pore.width_um"]) == number(scene["pore"]["width"])
         velocity = number(scene["flow"]["mean_velocity"])
-        columns = {"flow.mean_velocity_m_per_day", "mean_velocity_m_per_d"} & row.keys()
+        columns = {"flow.mean_velocity_m_per_d", "mean_velocity_m_per_d"} & row.keys()
         assert [float(row[name]) for name in columns] == pytest.approx([velocity] * len(columns), rel=1e-12)
     assert "mean_velocity_m_per_d" in table_rows[0]
-    assert len({(row["pore.width_um"], row["flow.mean_velocity_m_per_day"]) for row in table_rows}) == 6
+    assert len({(row["pore.width_um"], row["flow.mean_velocity_m_per_d"]) for row in table_rows}) == 6
 
 
 def test_every_option_of_the_command_has_its_effect(tmp_path, monkeypatch):

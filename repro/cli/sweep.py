@@ -24,12 +24,13 @@ if TYPE_CHECKING:
 SOME_FAILED = 3
 EPILOG = """\
 --vary takes a range KEY=a:b UNIT:linear|log:N or a list KEY=VALUE, VALUE, ... Several --vary make a
-grid. With --samples a range has no N: KEY=a:b UNIT:linear|log. Varying flow.head replaces
-flow.mean_velocity, and vice versa. The same command continues an interrupted sweep: it makes the
-missing runs and repeats the failed ones. On a cluster, DIR must be on a file system that all
-workers share. Exit status: 0 if every run has finished, 3 if some have failed, 2 if the input is
-wrong, 130 if interrupted (Ctrl-C), 143 if terminated (SIGTERM), 129, 138 or 140 if noticed (SIGHUP,
-SIGUSR1, SIGUSR2). A second signal, after a second or more, ends the sweep at once."""
+grid. --points takes a CSV file instead, with a run in each row. With --samples a range has no N:
+KEY=a:b UNIT:linear|log. Varying flow.head replaces flow.mean_velocity, and vice versa. The same
+command continues an interrupted sweep: it makes the missing runs and repeats the failed ones. On a
+cluster, DIR must be on a file system that all workers share. Exit status: 0 if every run has
+finished, 3 if some have failed, 2 if the input is wrong, 130 if interrupted (Ctrl-C), 143 if
+terminated (SIGTERM), 129, 138 or 140 if noticed (SIGHUP, SIGUSR1, SIGUSR2). A second signal, after
+a second or more, ends the sweep at once."""
 
 
 def add(commands) -> None:
@@ -38,14 +39,17 @@ def add(commands) -> None:
         "sweep", help="run a scene many times with varied keys", epilog=EPILOG,
         description="Run a scene many times with varied keys, on all cores.")
     add_scene(command)
-    command.add_argument("--vary", metavar="KEY=...", action="append", required=True,
+    command.add_argument("--vary", metavar="KEY=...", action="append", default=[],
                          help='key and values: "flow.mean_velocity=0.3:30 m/day:log:8" or '
                          '"pore.width=50 um, 60 um"; may be repeated')
+    command.add_argument("--points", metavar="FILE.csv", type=path,
+                         help="run the rows of a table instead; its head has keys with units, such "
+                         "as pore.width (um)")
     command.add_argument("--samples", metavar="N", type=int,
                          help="draw N runs from a Latin hypercube instead of a grid")
     command.add_argument("--seed", metavar="S", type=_natural_number, default=0,
                          help="seed of the Latin hypercube (default: 0)")
-    command.add_argument("--out", metavar="DIR", type=path, required=True,
+    command.add_argument("--out", metavar="DIR", type=path,
                          help="folder for the runs, their tables and their page")
     command.add_argument("--workers", metavar="N", type=_positive_number,
                          help="number of parallel runs (default: one per core)")
@@ -54,6 +58,9 @@ def add(commands) -> None:
     command.add_argument("--clogged", metavar="PART", type=_fraction, default=0.1,
                          help="fraction of the first conductivity at which a pore counts as "
                          "clogged (default: 0.1)")
+    command.add_argument("--dry-run", action="store_true",
+                         help="print the number of points, and roughly the time and disk space "
+                         "that they need, from trials of at most three; write nothing")
     command.add_argument("--quiet", action="store_true", help="do not show progress")
     command.set_defaults(call=call)
 
@@ -80,14 +87,28 @@ def call(options) -> int:
     """Make the sweep."""
     from repro.sweeps.driver import sweep
 
+    if options.dry_run:
+        return _dry_run(options)
     on_terminal = sys.stderr.isatty()
     with _end_on_signals(options.command_line):
-        swept = sweep(options.scene, options.vary, options.out, options.set, unset=options.unset,
+        swept = sweep(options.scene, options.vary, options.out, options.set,
+                      points=options.points, unset=options.unset,
                       samples=options.samples, seed=options.seed, workers=options.workers,
                       scheduler=options.scheduler, clogged=options.clogged,
                       progress=on_terminal and not options.quiet,
                       tell=None if on_terminal or options.quiet else _print_run)
     return _report(swept)
+
+
+def _dry_run(options) -> int:
+    """Print the expected cost of the sweep."""
+    from repro.sweeps import driver, expected, pool
+
+    plan = driver.plan(options.scene, options.vary, options.out or "", options.set, options.points,
+                       options.unset, options.samples, options.seed)
+    workers = min(options.workers or pool.cores(), len(plan.points))
+    say(printable(expected.describe(plan, workers)))
+    return 0
 
 
 @contextmanager
@@ -105,7 +126,8 @@ def _end_on_signals(command: str) -> Iterator[None]:
 def _print_run(event: dict) -> None:
     if event["event"] == "run":
         say(printable(f"{event['done']} of {event['total']}: run {event['run']}, "
-                      f"{event['values']}: {event['status']}"), to_stderr=True)
+                      f"{event['values']}: {event['status']}; about "
+                      f"{event['left_s']:.0f} s left"), to_stderr=True)
 
 
 def _report(swept: Swept) -> int:

@@ -170,7 +170,7 @@ def _cost(estimate: Cost) -> Iterator[str]:
         yield f"Cost, roughly: {memory}"
         return
     steps = f"{estimate.steps} steps" if estimate.steps else "no step"
-    yield (f"Cost, roughly: {_seconds(estimate.seconds)} ({steps}) without writing files; "
+    yield (f"Cost, roughly: {duration(estimate.seconds)} ({steps}) without writing files; "
            f"{memory}")
     yield "  The estimate is right within a factor of three in the paper's pores."
 
@@ -184,7 +184,7 @@ def _outlook(outlook: Outlook) -> Iterator[str]:
         yield f"  contact with the opposite wall from t = {outlook.contact:.3g} h on"
 
 
-def _seconds(value: float) -> str:
+def duration(value: float) -> str:
     """Write a time with two digits, or three from 99.5 s to 120 s."""
     if value < 120:
         return f"{value:.2g} s" if value < 99.5 else f"{value:.0f} s"

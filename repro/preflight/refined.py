@@ -17,7 +17,6 @@ import numpy as np
 from repro import results
 from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
-from repro.march.state import SAME_TIME
 from repro.model.meshing import MOST_REFINED
 from repro.polling import polling
 from repro.preflight.memory import require_memory, require_outline
@@ -35,6 +34,8 @@ FACTORS = {"refinement": FACTOR, "tolerance": FACTOR**-2, "contact_elements": FA
 #: Intervals between rows, if the scene requests no times.
 INTERVALS = 24
 WIDTH = 110
+#: Digits of the times (h) of common rows.
+DIGITS = 9
 
 
 class _OutOfTime(Exception):
@@ -170,12 +171,12 @@ def compare_with_finer(scene: Scene, file: str, limit: float,
     own, other = _Run("own", scene), _Run("finer", finer)
     begun = process_time()
     stopped = _advance_both(own, other, limit, report)
-    common = _common_rows(own, other)
-    if not common:
+    times = [time for time in own.rows if time in other.rows]
+    if not times:
         raise SceneError(f"{file}: no row to compare: {stopped}")
-    time = common[-1][0]
-    return FinerComparison(scene.name, _describe(scene), _describe(finer), time, len(common),
-                           stopped, process_time() - begun, limit, _largest_differences(common))
+    return FinerComparison(scene.name, _describe(scene), _describe(finer), times[-1], len(times),
+                           stopped, process_time() - begun, limit,
+                           _largest_differences(own, other, times))
 
 
 def refine(scene: Scene) -> Scene:
@@ -215,19 +216,19 @@ def _with_rows(scene: Scene) -> Scene:
 
 
 class _Run:
-    """A run, step by step. time: h, that it has reached; rows: (time, columns)."""
+    """A run, step by step. time: h, that it has reached; rows: columns by time (h)."""
 
     def __init__(self, name: str, scene: Scene):
         self.name = name
         self.time = -1.0
-        self.rows: list[tuple[float, dict[str, float | None]]] = []
+        self.rows: dict[float, dict[str, float | None]] = {}
         self.stopped: str | None = None
         self._steps = self._advance(_with_rows(scene))
 
     def _advance(self, scene: Scene) -> Iterator[None]:
         for state, row in steps(scene):
             if row:
-                self.rows.append((row.pore.time, results.row(scene, row)))
+                self.rows[round(row.pore.time, DIGITS)] = results.row(scene, row)
             self.time = state.pore.time
             yield
 
@@ -244,7 +245,7 @@ class _Run:
 
 
 def _advance_both(own: _Run, finer: _Run, limit: float, report: Callable[[float], None]) -> str:
-    """Advance both runs side by side, as far as both come; return why they stop, "" at the end."""
+    """Advance the run that is behind until it stops; return why it stops, "" at the end."""
     deadline = process_time() + limit
 
     def check() -> None:
@@ -253,7 +254,7 @@ def _advance_both(own: _Run, finer: _Run, limit: float, report: Callable[[float]
 
     try:
         with polling(check):
-            while behind := _behind(own, finer):
+            while (behind := min(own, finer, key=lambda run: run.time)).stopped is None:
                 check()
                 behind.step()
                 report(max(0.0, min(own.time, finer.time)))
@@ -262,23 +263,12 @@ def _advance_both(own: _Run, finer: _Run, limit: float, report: Callable[[float]
     return "; ".join(filter(None, (own.stopped, finer.stopped)))
 
 
-def _behind(own: _Run, finer: _Run) -> _Run | None:
-    """Return the run to advance: the one that has not passed the other, unless it has stopped."""
-    behind = min(own, finer, key=lambda run: run.time)
-    return behind if behind.stopped is None else None
-
-
-def _common_rows(own: _Run, finer: _Run) -> list[tuple[float, dict, dict]]:
-    """Return the time (h) and both rows of each time at which both runs have one."""
-    return [(time, row, other) for time, row in own.rows for later, other in finer.rows
-            if abs(later - time) <= SAME_TIME]
-
-
-def _largest_differences(common: list[tuple[float, dict, dict]]) -> list[Difference]:
-    """Return the largest difference of each column that both runs have."""
+def _largest_differences(own: _Run, finer: _Run, times: list[float]) -> list[Difference]:
+    """Return the largest difference of each column that both runs have at these times (h)."""
     computed = []
-    for name in common[0][1]:
-        values = np.array([(time, own[name], finer[name]) for time, own, finer in common], float)
+    for name in own.rows[times[0]]:
+        values = np.array([(time, own.rows[time][name], finer.rows[time][name]) for time in times],
+                          float)
         values = values[np.isfinite(values).all(axis=1)]
         if len(values) and name not in names.NOT_COMPARED:
             computed.append(_largest(name, *values.T))

@@ -1,6 +1,8 @@
 """Many runs of a scene with varied keys, each in its own folder.
 
     design    the runs: a grid, lists, a Latin hypercube
+    own_points  points of a file, a table or an array
+    expected  the time and disk space of a sweep
     folder    sweep.json and the folders of the runs
     single_run  runs in a process of a sweep
     pool      runs on all cores

@@ -61,8 +61,12 @@ class Factor:
 
     @property
     def column(self) -> str:
-        """Name of its column, such as ``flow.mean_velocity_m_per_day``."""
-        unit = re.sub(r"[\s*^]+", "", re.sub(r"\s*/\s*", "_per_", self.unit)).strip("_")
+        """Name of its column, such as ``flow.mean_velocity_m_per_d``.
+
+        Units are spelled as in the columns of results.
+        """
+        unit = re.sub(r"\s*/\s*", "_per_", re.sub(r"\bday\b", "d", self.unit))
+        unit = re.sub(r"[\s*^]+", "", unit).strip("_")
         return f"{self.key}_{unit}" if unit else self.key
 
     def text(self, value: float | str) -> str:
@@ -109,7 +113,7 @@ def _refused(text: str, accepted: str) -> SceneError:
 
 def _range(text: str, key: str, rest: str) -> Factor:
     low, high, spacing, count = (*(part.strip() for part in rest.split(":", 3)), "", "", "")[:4]
-    (start, first_unit), (end, unit) = _number(low), _number(high)
+    (start, first_unit), (end, unit) = number(low), number(high)
     if not (start and end) or first_unit:
         raise _refused(text, EXPECTED_FORM)
     if spacing not in ("linear", "log") or not re.fullmatch("[0-9]{0,9}", count):
@@ -125,8 +129,8 @@ def _range(text: str, key: str, rest: str) -> Factor:
 
 
 def _list(text: str, key: str, rest: str) -> Factor:
-    items = [_bare(item.strip()) for item in rest.split(",")]
-    numbers = [_number(item) for item in items]
+    items = [bare(item.strip()) for item in rest.split(",")]
+    numbers = [number(item) for item in items]
     if "" in items or len({(bool(digits), unit) for digits, unit in numbers}) > 1:
         raise _refused(text, "values in one and the same unit, or words, are needed")
     if not numbers[0][0]:
@@ -137,12 +141,12 @@ def _list(text: str, key: str, rest: str) -> Factor:
     return Factor(key, numbers[0][1], values)
 
 
-def _bare(item: str) -> str:
+def bare(item: str) -> str:
     """An item of a list without the quotes around it."""
     return item[1:-1] if len(item) > 1 and item[0] == item[-1] == '"' else item
 
 
-def _number(text: str) -> tuple[str, str]:
+def number(text: str) -> tuple[str, str]:
     """The digits and the unit of a text, both empty if it is not a number."""
     match = _NUMBER.fullmatch(text)
     return (match[1], match[2]) if match else ("", "")
@@ -186,13 +190,13 @@ def latin(factors: list[Factor], samples: int, seed: int) -> list[tuple]:
     if not 1 <= samples <= MOST_POINTS:
         raise SceneError(f"--samples {samples}: from 1 to {MOST_POINTS} are accepted")
     drawn = qmc.LatinHypercube(len(factors), rng=np.random.default_rng(seed)).random(samples)
-    return [tuple(map(_at, factors, row.tolist())) for row in drawn]
+    return [tuple(map(at, factors, row.tolist())) for row in drawn]
 
 
-def _at(factor: Factor, fraction: float) -> float | str:
+def at(factor: Factor, fraction: float) -> float | str:
     """The value of a factor at a fraction (0 to 1) of its range or list."""
     if factor.spacing == "list":
-        return factor.values[int(fraction * len(factor.values))]
+        return factor.values[min(int(fraction * len(factor.values)), len(factor.values) - 1)]
     low, high = factor.values
     if factor.spacing == "log":
         return low * (high / low) ** fraction
@@ -200,8 +204,9 @@ def _at(factor: Factor, fraction: float) -> float | str:
 
 
 def points(source: Source, sets: list[str], factors: list[Factor], combinations: list[tuple],
-           unset: Sequence[str] = ()) -> list[Point]:
-    """Make and check the runs of a sweep; sets, unset: the entries of --set and --unset.
+           unset: Sequence[str] = (), origin: str = "run") -> list[Point]:
+    """Make and check the runs of a sweep; sets, unset: the entries of --set and --unset; origin:
+    of the points, which precedes their numbers in messages.
 
     Raises SceneError, with the number of the run, if a scene is not accepted or equals another one,
     or if a key is both varied and set.
@@ -213,12 +218,13 @@ def points(source: Source, sets: list[str], factors: list[Factor], combinations:
     for index, values in enumerate(combinations, 1):
         run_label = label(factors, values)
         tables = load_tables(source, sets, unset)
-        scene = _scene(label_of(source), tables, factors, values, f"run {index} ({run_label})")
+        scene = _scene(label_of(source), tables, factors, values,
+                       f"{origin} {index} ({run_label})")
         point = Point(index, values, scene)
         twin = first.setdefault(scene_hash(point.scene), index)
         if twin != index:
-            raise SceneError(f"run {index} ({run_label}): the same scene as run {twin}; each run "
-                             "once is accepted")
+            raise SceneError(f"{origin} {index} ({run_label}): the same scene as run {twin}; each "
+                             "run once is accepted")
         runs.append(point)
     return runs
 

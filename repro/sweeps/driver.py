@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from repro.results import drawing
@@ -17,7 +18,7 @@ from repro.runs.folder import folder_errors
 from repro.runs.machine import refuse_exchanged, require_packages
 from repro.scene import SceneError, Source, label
 from repro.scene.arguments import Overrides, typed
-from repro.sweeps import cluster, design, page, pool, table
+from repro.sweeps import cluster, design, own_points, page, pool, table
 from repro.sweeps.folder import Sweep, SweepError, lock_folder
 from repro.timing import progress_bar
 
@@ -139,10 +140,11 @@ class Swept:
 
 
 @typed
-def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Overrides = (), *,
-          unset: Sequence[str] = (), samples: int | None = None, seed: int = 0,
-          workers: int | None = None, scheduler: str | None = None, clogged: float = CLOGGED,
-          progress: bool = False, tell: Tell | None = None) -> Swept:
+def sweep(scene: Source, vary: Sequence[str] = (), folder: str | Path | None = None,
+          overrides: Overrides = (), *, points: Any = None, unset: Sequence[str] = (),
+          samples: int | None = None, seed: int = 0, workers: int | None = None,
+          scheduler: str | None = None, clogged: float = CLOGGED, progress: bool = False,
+          tell: Tell | None = None) -> Swept:
     """Run a scene many times with varied keys, and write tables and a page.
 
     Finished runs in the folder are not repeated. A run that fails has a status that says so.
@@ -151,17 +153,23 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Ove
     ----------
     scene : Scene, str, Path or dict
         A loaded scene, a TOML file, the name of a packaged scene, or a dict of tables.
-    vary : sequence of str
+    vary : sequence of str, optional
         A range or a list for each varied key, such as ``"flow.mean_velocity=0.3:30 m/day:log:8"``
         or ``"pore.width=50 um, 60 um"``, as for ``repro sweep --vary``.
     folder : str or Path
-        Folder for the runs, the tables and the page.
+        Folder for the runs, the tables and the page. It is needed.
     overrides : sequence of str or dict, optional
         Changes of the scene, such as ``{"growth.end": "5 h"}``.
+    points : str, Path, mapping, DataFrame, array or engine, optional
+        Own points. Points with names are a CSV file, a dict of columns, a ``pandas.DataFrame`` or a
+        structured array; a name is a key with its unit, such as ``"pore.width (um)"``. Points
+        without names lie in the unit cube and are scaled to the ranges of ``vary``: an array (n,
+        number of ranges), or an engine of ``scipy.stats.qmc`` with ``samples``.
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
     samples : int, optional
-        Number of runs of a Latin hypercube. By default all combinations of the values are run.
+        Number of runs of a Latin hypercube, or of an engine. By default all combinations of the
+        values are run.
     seed : int, optional
         Seed of the Latin hypercube.
     workers : int, optional
@@ -183,7 +191,7 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Ove
     Raises
     ------
     SceneError
-        If a scene, or the value of an argument, is not accepted.
+        If a scene, a point, or the value of an argument is not accepted.
     OutputError
         If the folder cannot be used, or the scheduler does not answer.
     TypeError
@@ -198,22 +206,35 @@ def sweep(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Ove
     >>> [run.status for run in swept.runs]
     ['completed', 'completed']
     """
-    refuse_exchanged(scene)
-    _refuse_values(vary, workers, seed, clogged)
-    factors = [design.parse(text) for text in vary]
-    combinations = design.grid(factors) if samples is None else design.latin(factors, samples, seed)
-    with ready(scheduler, min(workers or pool.cores(), len(combinations))) as run_points:
-        points = design.points(scene, list(overrides), factors, combinations, unset)
-        for point in points if scheduler is None else ():
+    if folder is None:
+        raise SceneError("--out: a folder is needed")
+    _refuse_values(workers, seed, clogged)
+    swept = plan(scene, vary, folder, overrides, points, unset, samples, seed)
+    with ready(scheduler, min(workers or pool.cores(), len(swept.points))) as run_points:
+        for point in swept.points if scheduler is None else ():
             require_packages(point.scene)
-        plan = Sweep(Path(folder), label(scene), factors, points)
-        return run_plan(plan, run_points, clogged, progress, tell)
+        return run_plan(swept, run_points, clogged, progress, tell)
 
 
-def _refuse_values(vary: Sequence[str], workers: int | None, seed: int, clogged: float) -> None:
+def plan(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Overrides, points: Any,
+         unset: Sequence[str], samples: int | None, seed: int) -> Sweep:
+    """Make and check the runs of :func:`sweep`, which has these arguments; writes nothing."""
+    refuse_exchanged(scene)
+    factors = [design.parse(text) for text in vary]
+    if points is not None:
+        factors, combinations = own_points.read(points, factors, samples)
+    elif not vary:
+        raise SceneError("--vary: a key with its values is needed, or points")
+    else:
+        combinations = (design.grid(factors) if samples is None
+                        else design.latin(factors, samples, seed))
+    named = "run" if points is None else f"{own_points.origin(points)}: row"
+    runs = design.points(scene, list(overrides), factors, combinations, unset, named)
+    return Sweep(Path(folder), label(scene), factors, runs)
+
+
+def _refuse_values(workers: int | None, seed: int, clogged: float) -> None:
     """Raise SceneError for a value of an argument of :func:`sweep` that is out of range."""
-    if not vary:
-        raise SceneError("--vary: a key with its values is needed")
     if workers is not None and workers < 1:
         raise SceneError(f"workers {workers}: an integer, one or more, is needed")
     if seed < 0:
@@ -263,12 +284,14 @@ def _run_missing(plan: Sweep, run_points: pool.RunPoints, statuses: dict[int, st
     tell({"event": "start", "scene": plan.source, "done": completed, "total": total})
     if not missing:
         return
+    begun = monotonic()
     with closing(run_points(missing, plan.runs)) as ended_runs:
         for point, status in ended_runs:
             statuses[point.index] = status
             tell({"event": "run", "done": completed + len(statuses), "total": total,
                   "run": point.index, "values": design.label(plan.factors, point.values),
-                  "status": status})
+                  "status": status,
+                  "left_s": (monotonic() - begun) * (len(missing) / len(statuses) - 1)})
 
 
 def _write_results(plan: Sweep, statuses: dict[int, str], clogged: float) -> table.Runs:

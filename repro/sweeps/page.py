@@ -15,6 +15,7 @@ from repro.report import page as html
 from repro.report.colours import viridis
 from repro.results import write_text
 from repro.results.files import atomic_path
+from repro.results.names import ANSWER, KNOWN
 from repro.results.quantities import Quantity
 from repro.sweeps.design import Factor, label
 from repro.sweeps.folder import Sweep
@@ -26,9 +27,9 @@ LEVELS = 7
 ON_LIGHT, ON_DARK = (0.0, 0.65), (0.35, 1.0)
 #: Radius of the dots of runs.
 RADIUS = 4
-#: The numbers in the row of a run.
-TABLE_NUMBERS = """end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
-wall_time_s""".split()
+#: The numbers in the row of a run, without those that no run has.
+TABLE_NUMBERS = (*"""end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
+""".split(), *ANSWER, "wall_time_s")
 
 
 def write(sweep: Sweep, runs: list[SweepRun], clogged: float) -> None:
@@ -65,8 +66,12 @@ def _rules(colours: list[str]) -> str:
 
 
 def _describe(factor: Factor) -> str:
+    values = list(dict.fromkeys(factor.values))
+    if factor.spacing == "list" and (len(values) <= 2 * LEVELS or not factor.numeric):
+        return f"{factor.key}: {', '.join(map(factor.short, values))}"
     if factor.spacing == "list":
-        return f"{factor.key}: {', '.join(map(factor.short, factor.values))}"
+        first, last = factor.short(min(values)), factor.short(max(values))
+        return f"{factor.key}: {len(values)} values from {first} to {last}"
     count = f", {factor.count} values" if factor.count else ""
     first, last = map(factor.short, factor.values)
     return f"{factor.key}: {first} to {last}, {factor.spacing}{count}"
@@ -242,11 +247,12 @@ def _time(run: SweepRun) -> float:
 
 
 def _table(sweep: Sweep, runs: list[SweepRun]) -> str:
-    quantities = {each.name: each for each in NUMBERS}
+    quantities = KNOWN | {each.name: each for each in NUMBERS}
+    shown = [name for name in TABLE_NUMBERS if any(_value(run, name) is not None for run in runs)]
     names = ["run", *(factor.key for factor in sweep.factors),
-             *(_heading(quantities[name]) for name in TABLE_NUMBERS)]
+             *(_heading(quantities[name]) for name in shown)]
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
-    rows = "".join(_row(sweep, run) for run in runs)
+    rows = "".join(_row(sweep, run, shown) for run in runs)
     failures = "".join(f'<li class="bad">run {run.point.index}: {escape(run.status)}</li>'
                        for run in runs if not run.is_over)
     return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
@@ -258,9 +264,14 @@ def _heading(number: Quantity) -> str:
     return f"{number.label} ({number.unit.symbol})" if number.unit.symbol else number.label
 
 
-def _row(sweep: Sweep, run: SweepRun) -> str:
+def _value(run: SweepRun, name: str) -> float | None:
+    """An event of a run, or the last value of a column."""
+    return run.numbers[name] if name in run.numbers else run.final.get(name)
+
+
+def _row(sweep: Sweep, run: SweepRun, shown: list[str]) -> str:
     values = [factor.short(value) for factor, value in zip(sweep.factors, run.point.values)]
-    numbers = [_short(run.numbers[name]) for name in TABLE_NUMBERS]
+    numbers = [_short(_value(run, name)) for name in shown]
     cells = "".join(f"<td>{escape(text)}</td>" for text in (*values, *numbers))
     link = f'<td><a href="runs/{escape(run.point.name)}/">{run.point.index}</a></td>'
     status = escape(run.status if run.is_over else run.status.partition(":")[0])

@@ -16,6 +16,7 @@ STEPPING = "tests/test_stepping.py::test_"
 NOT_MET = "tests/test_warned.py::test_a_missed_tolerance_is_reported_with_the_largest_estimate"
 ODD = "tests/test_odd_outlines.py::test_"
 CHECK = "tests/test_check.py::test_"
+POINTS = "tests/test_sweep_points.py::test_"
 FINER = "tests/test_finer.py::test_"
 ADVICE = "tests/test_advice.py::test_"
 BEFORE_END = f"{STEPPING}steps_and_rows_before_the_end_do_not_depend_on_it[fast-0.55]"
@@ -666,7 +667,7 @@ MUTANTS = (
          "tests/test_sweep_design.py::test_levels_are_evenly_spaced_between_the_ends"),
         ("strata-of-the-values",
          "A Latin hypercube draws a logarithmic range evenly in its values.",
-         "_at",
+         "at",
          "return low * (high / low) ** fraction",
          "return low + fraction * (high - low)",
          "tests/test_sweep_design.py::test_each_stratum_of_each_range_has_one_value"),
@@ -1423,12 +1424,14 @@ MUTANTS = (
         ("sweep-ignores-seed",
          "The command ignores --seed.",
          "call",
-         "sweep(options.scene, options.vary, options.out, options.set, unset=options.unset,\n"
+         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
+         "      unset=options.unset,\n"
          "      samples=options.samples, seed=options.seed, workers=options.workers,\n"
          "      scheduler=options.scheduler, clogged=options.clogged,\n"
          "      progress=on_terminal and not options.quiet,\n"
          "      tell=None if on_terminal or options.quiet else _print_run)",
-         "sweep(options.scene, options.vary, options.out, options.set, unset=options.unset,\n"
+         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
+         "      unset=options.unset,\n"
          "      samples=options.samples, workers=options.workers,\n"
          "      scheduler=options.scheduler, clogged=options.clogged,\n"
          "      progress=on_terminal and not options.quiet,\n"
@@ -1437,12 +1440,14 @@ MUTANTS = (
         ("sweep-ignores-clogged",
          "The command ignores --clogged.",
          "call",
-         "sweep(options.scene, options.vary, options.out, options.set, unset=options.unset,\n"
+         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
+         "      unset=options.unset,\n"
          "      samples=options.samples, seed=options.seed, workers=options.workers,\n"
          "      scheduler=options.scheduler, clogged=options.clogged,\n"
          "      progress=on_terminal and not options.quiet,\n"
          "      tell=None if on_terminal or options.quiet else _print_run)",
-         "sweep(options.scene, options.vary, options.out, options.set, unset=options.unset,\n"
+         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
+         "      unset=options.unset,\n"
          "      samples=options.samples, seed=options.seed, workers=options.workers,\n"
          "      scheduler=options.scheduler,\n"
          "      progress=on_terminal and not options.quiet,\n"
@@ -1452,9 +1457,9 @@ MUTANTS = (
         "repro/sweeps/driver.py",
         ("sweep-ignores-unset",
          "A sweep ignores --unset.",
-         "sweep",
-         "design.points(scene, list(overrides), factors, combinations, unset)",
-         "design.points(scene, list(overrides), factors, combinations)",
+         "plan",
+         "design.points(scene, list(overrides), factors, combinations, unset, named)",
+         "design.points(scene, list(overrides), factors, combinations, (), named)",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect")),
     *changes(
         "repro/sweeps/table.py",
@@ -2734,8 +2739,44 @@ MUTANTS = (
          f"{FINER}a_difference_has_its_scale"),
         ("one-run-first",
          "The scene's own run comes to its end before the finer one begins.",
-         "_behind",
-         "behind = min(own, finer, key=lambda run: run.time)",
-         "behind = own if own.stopped is None else finer",
+         "_advance_both",
+         "min(own, finer, key=lambda run: run.time)",
+         "(own if own.stopped is None else finer)",
          f"{FINER}runs_are_compared_as_far_as_the_time_allows")),
+    *changes(
+        "repro/sweeps/own_points.py",
+        ("points-in-the-unit-of-the-key",
+         "A column of points loses the unit of its head.",
+         "_factor",
+         'number(f"{text} {unit}".strip())',
+         "number(text)",
+         f"{POINTS}points_with_names_have_their_values_and_units"),
+        ("points-of-the-cube-not-checked",
+         "A point outside the unit cube is scaled beyond the range.",
+         "_scaled",
+         "~((values >= 0) & (values <= 1))",
+         "~((values >= 0) | (values <= 1))",
+         f"{POINTS}bad_points_are_refused_in_one_line"),
+        ("missing-value-is-a-word",
+         "A missing value of a column of words is a word.",
+         "_factor",
+         "text.lower() in NO_VALUE",
+         "False",
+         f"{POINTS}bad_points_are_refused_in_one_line")),
+    *changes(
+        "repro/sweeps/expected.py",
+        ("cost-of-the-tried-runs-alone",
+         "A sweep is expected to cost as much as the runs that are tried.",
+         "describe",
+         "len(sweep.points) * sum(each) / len(costs)",
+         "sum(each)",
+         f"{POINTS}a_dry_run_states_points_time_and_disk")),
+    *changes(
+        "repro/sweeps/driver.py",
+        ("time-left-of-all-runs",
+         "The time that is left counts finished runs.",
+         "_run_missing",
+         "(len(missing) / len(statuses) - 1)",
+         "len(missing) / len(statuses)",
+         f"{POINTS}the_time_left_is_that_of_the_missing_runs")),
 )
