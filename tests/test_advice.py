@@ -45,6 +45,7 @@ FOLLOWED = {
                    "try a smaller numerics.refinement": MEMORY},
     "cli/sweep.py": {"continues the sweep": "tests/test_sweep.py::test_a_signal_ends_a_sweep_quietly"},
     "fem/linear.py": {"pip install": PACKAGES},
+    "scene/drawn.py": {"pip install": PACKAGES},
     "scene/former.py": {"leave it out": "tests/test_former.py::test_the_advice_is_accepted"},
     "march/folding.py": {'growth.new_biomass = "stress_free" does': STRESS_FREE},
     "march/state.py": {"try a smaller numerics.refinement": MEMORY},
