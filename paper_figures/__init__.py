@@ -11,4 +11,4 @@ DISCUSSED = ("discussion_biomass", "discussion_transfer", "discussion_tearing", 
              "discussion_permeable", "discussion_head", "discussion_folds")
 #: In the order of the paper, followed by the additions.
 FIGURES = ("figure_2", "figure_3", "figure_4", "figure_5", "plate_1", "plate_2", "figure_6", "time_series", *DISCUSSED,
-           "network", "where_biomass_sits")
+           "network", "where_biomass_sits", "settle_or_plug")

@@ -143,7 +143,7 @@ CAPTIONS = {
 }
 #: Figures whose captions have numbers of the model alone, or of records with tests of their own.
 OF_MODEL = {"figure_2", "figure_3", "discussion_folds", "discussion_tearing", "discussion_transfer", "network",
-            "where_biomass_sits"}
+            "where_biomass_sits", "settle_or_plug"}
 
 
 def test_the_caption_about_arrangements_has_the_losses_of_their_runs(tmp_path, monkeypatch):
@@ -155,6 +155,42 @@ def test_the_caption_about_arrangements_has_the_losses_of_their_runs(tmp_path, m
     assert missing(["each other (two facing)", "0.6 W²", "one 0 %, two facing 10 %, two staggered 20 %",
                     "pairs 30 %, eight alternating 40 %", "leaves 1.7 times", "conductivity as one than as eight",
                     "by 5.0 percentage points"], caption) is None
+
+
+HOURS = np.linspace(0.0, 60.0, 13)
+
+
+@pytest.mark.parametrize("share, gone, name", [
+    (np.interp(HOURS, [0, 20, 40], [1, 0.8, 0.2]), False, "settles"),
+    (np.interp(HOURS, [0, 20, 60], [1, 0.8, 0.2]), False, "undecided"),
+    (np.interp(HOURS, [0, 20, 40], [1, 0.8, 0.04]), False, "plugs"),
+    (np.interp(HOURS, [0, 20, 25, 50], [1, 0.5, 1, 1]), False, "settles"),
+    (np.interp(HOURS, [0, 20, 25, 50], [1, 0.5, 1, 1]), True, "washes out"),
+    (np.interp(HOURS, [0, 20, 25, 50], [1, 0.5, 0.62, 0.51]), True, "oscillates"),
+    (np.interp(HOURS, [0, 20, 25, 50], [1, 0.5, 0.62, 0.52]), False, "settles"),
+    (np.interp(HOURS, [0, 20, 25, 50], [1, 0.5, 0.59, 0.4]), False, "settles")])
+def test_a_behaviour_follows_from_its_criterion(share, gone, name):
+    assert MODULES["settle_or_plug"].behaviour(HOURS, share, gone, 60.0) == name
+
+
+def test_a_run_that_ends_before_the_horizon_does_not_settle():
+    assert MODULES["settle_or_plug"].behaviour(HOURS[:-1], np.full(12, 0.5), False, 60.0) == "undecided"
+
+
+def test_the_mean_conductivity_is_that_of_the_second_half():
+    """Its begin lies between two rows."""
+    mean = MODULES["settle_or_plug"].mean_share(np.array([0.0, 10, 50, 60]), np.array([1.0, 1, 0.2, 0]))
+    assert mean == pytest.approx((0.4 * 20 + 0.1 * 10) / 30)
+
+
+def test_the_caption_about_behaviours_counts_them(monkeypatch):
+    """Every run but the last loses 99 %."""
+    module = MODULES["settle_or_plug"]
+    monkeypatch.setattr(module, "_course", lambda folder: (2 * HOURS, np.linspace(1.0, folder, 13)))
+    monkeypatch.setattr(module, "_gone", lambda folder: False)
+    count = len(module.RUNS)
+    caption = module.caption(*[0.01] * (count - 1), 1.0)
+    assert f"washes out 0, plugs {count - 1}, settles 1, undecided 0. Dotted: a plug, K / K_0 = 0.05" in caption
 
 
 def missing(expected, caption):
