@@ -77,10 +77,10 @@ Data flow:
     repro.march       advances the Pore step by step, and yields Reports: pore, flow, substrates,
                       ledgers
     repro.results     makes rows and fields from Reports, in the units that their names end in
-    repro.network     the laws for throats, which need no run
     repro.preflight   predicts a run: dimensionless numbers, warnings, cost (repro check)
     repro.report      pages that show and compare runs (repro compare)
     repro.runs        a run on the disk: folder, recorder, checkpoints, provenance (repro run)
+    repro.network     the laws for throats, of Table 1 or of a scene
     repro.sweeps      many scenes at once (repro sweep)
     repro.cli         the command line
 
@@ -102,8 +102,7 @@ if TYPE_CHECKING:
     from repro.march.ends import Steady as Steady
     from repro.march.folding import Fold as Fold
     from repro.march.simulation import simulate
-    from repro.network.resistance import added_resistance
-    from repro.network.uptakes import uptake
+    from repro.network.throats import added_resistance, uptake
     from repro.preflight.checked import check
     from repro.preflight.refined import error
     from repro.report import compare
@@ -122,11 +121,11 @@ else:
                 "PoreEnd": "march.ends", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "Steady": "march.ends",
-                "added_resistance": "network.resistance", "check": "preflight.checked",
+                "added_resistance": "network.throats", "check": "preflight.checked",
                 "compare": "report", "error": "preflight.refined",
                 "load_run": "runs.scripts", "load_scene": "scene",
                 "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",
-                "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "network.uptakes"}
+                "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "network.throats"}
 
     def __getattr__(name: str):
         if name == "__version__":

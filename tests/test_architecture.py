@@ -18,8 +18,8 @@ GENERATED = {"__pycache__", "out", "cache", "live", "pictures", "build", "dist",
 FORBIDDEN = {"repro": {"reference", "verification", "paper_figures", "tests", "pickle"},
              "reference": {"repro", "pickle"}, **dict.fromkeys(FOLDERS[2:], {"pickle"})}
 #: The rooms of `repro` in order. Each may import the rooms before it.
-ROOMS = ("errors", "timing", "polling", "schemes", "scene", "fem", "model", "march", "results", "network", "preflight",
-         "report", "runs", "sweeps", "cli", "__main__")
+ROOMS = ("errors", "timing", "polling", "schemes", "scene", "fem", "model", "march", "results", "preflight",
+         "report", "runs", "network", "sweeps", "cli", "__main__")
 #: Earlier rooms that a room may not import: finite elements know sizes and solvers, but no scenes.
 CLOSED = {"fem": {"scene"}}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -1,5 +1,9 @@
-"""A network of 100 throats in OpenPNM, with the laws of throats: flow, uptake and growth over 48 h (make network)."""
+"""A network of 100 throats in OpenPNM, with the laws of throats: flow, uptake and growth over 48 h (make network).
 
+An argument is a scene whose kinetics replace those of Table 1, such as mine.toml.
+"""
+
+import sys
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -11,7 +15,8 @@ import repro
 LENGTH = 600.0                # um, of each throat
 HEAD_DROP = 12.0              # um, over the network
 PER_HEAD = 9.81 / 12e-6 * 86400 * 1e-12  # g / (12 nu), m/d per um2 at a slope of 1
-SUPPLY = 8.0, 5.0             # mg/L of acceptor and donor
+SUPPLY = 8.0, 5.0             # mg/L of acceptor and donor, at most those of the scene
+SCENE = repro.load_scene(sys.argv[1]) if __name__ == "__main__" and sys.argv[1:] else None
 STEP, END = 2.0, 48.0         # h
 FLOW = 1e6 / 24               # um2/h in 1 m/d um
 
@@ -27,7 +32,7 @@ water = openpnm.phase.Phase(network=network)
 
 def heads(area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Heads of the pores (um), and flow in the throats from their first to their second pore (m/d um)."""
-    length = LENGTH + repro.added_resistance(area, width).length * width
+    length = LENGTH + repro.added_resistance(area, width, scene=SCENE).length * width
     conductance = PER_HEAD * width**3 / length
     water["throat.hydraulic_conductance"] = conductance
     flow = openpnm.algorithms.StokesFlow(network=network, phase=water)
@@ -53,7 +58,8 @@ def supplies(area: np.ndarray, head: np.ndarray, flow: np.ndarray) -> tuple[np.n
             concentration[:, pore] = brought[:, pore] / inflow[pore]
         leaving = np.flatnonzero((upstream == pore) & (np.abs(flow) > 1e-12))
         volume = np.abs(flow[leaving])
-        uptake = repro.uptake(area[leaving], width[leaving], volume / width[leaving], *concentration[:, pore])
+        uptake = repro.uptake(area[leaving], width[leaving], volume / width[leaving],
+                              *concentration[:, pore], scene=SCENE)
         taken[:, leaving], growth[leaving] = (uptake.acceptor, uptake.donor), uptake.growth
         np.add.at(inflow, downstream[leaving], volume)
         for substrate in range(2):

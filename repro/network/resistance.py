@@ -54,50 +54,15 @@ class AddedResistance(NamedTuple):
     most: np.ndarray
 
 
-def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | None = None,
-                     viscosity_ratio: float = 2000.0, *, outside: str = "raise") -> AddedResistance:
-    """Resistance that aggregates add to pores, as a length of empty pore over W.
+def resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | None, ratio: float,
+               outside: str = "raise", shapes: np.ndarray | None = None,
+               largest: float = np.inf) -> AddedResistance:
+    """Return the law; arguments as for :func:`repro.added_resistance`.
 
-    Parameters
-    ----------
-    area : array_like
-        Areas of the aggregates, in any unit of area and of any shape; zero in an empty pore.
-    width : array_like
-        Widths of the pores, in the square root of that unit. Its shape broadcasts with the areas.
-    spanned : array_like of bool, optional
-        True if the aggregate touches both walls. Its shape broadcasts with the areas. By default
-        the area decides: an aggregate of more than 1.51 width^2 touches both walls. From 1.41 to
-        1.6 width^2 the bounds then include shapes with contact and without it.
-    viscosity_ratio : float
-        Viscosity of the aggregates over that of water, lambda, without unit.
-    outside : {"raise", "nan"}
-        A pore outside the law's range raises an error with its index, or its results are
-        not-a-number.
-
-    Returns
-    -------
-    AddedResistance
-        Arrays of the broadcast shape, without unit.
-
-    Raises
-    ------
-    ValueError
-        If a width is not positive, or area / width^2 or viscosity_ratio is outside the law's range:
-        0 to 1.5 before contact, 1.41 to 4.5 after it, lambda 100 to 10 000.
-
-    Notes
-    -----
-    The head loss of a pore is 12 nu u_ave / (g W^2) (L + length W), with the viscous aggregate of
-    2.1 and the paper's condition on its surface [E2], at least 1.5 W from the pore's ends.
-
-    Examples
-    --------
-    >>> import repro
-    >>> added = repro.added_resistance([0.0, 500.0, 4000.0, 9000.0], 50.0)
-    >>> bool((added.least <= added.length).all() and (added.length <= added.most).all())
-    True
+    shapes: (m, 3) grown shapes that r follows: whether they touch both walls, A / W^2 and r;
+    largest: A / W^2 up to which it does.
     """
-    ratio, ratios = float(viscosity_ratio), _table(False).ratios
+    ratios = _table(False).ratios
     Check("added_resistance", "raise").within("viscosity_ratio", ratio, ratios[0], ratios[-1])
     area, width = np.broadcast_arrays(np.asarray(area, float), np.asarray(width, float))
     share = area_share(area, width)
@@ -107,13 +72,31 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
     is_known = check.positive("width", width) & (
         check.within(SHARE, share, 0.0, share_range(True)[1]) if spanned is None
         else _within_kind(check, share, touches))
+    is_known &= check.within(SHARE, share, 0.0, largest)
     results = np.full((3, *share.shape), np.nan)
     for kind in (False, True):
         selected = is_known & (touches == kind)
         results[:, selected] = _law(kind, share[selected], ratio)
     if spanned is None:
         _include_both_kinds(results, share, ratio)
+    if shapes is not None:
+        factor = _of_shapes(shapes, touches, share, ratio)
+        results *= np.stack([factor, np.minimum(factor, 1.0), np.maximum(factor, 1.0)])
     return AddedResistance(*results)
+
+
+def _of_shapes(shapes: np.ndarray, touches: np.ndarray, share: np.ndarray,
+               ratio: float) -> np.ndarray:
+    """(...) r of shapes over that of the law, at A / W^2 (...); 1 if none is of the same kind."""
+    factor = np.ones_like(share)
+    for kind in (False, True):
+        _, shares, lengths = shapes[shapes[:, 0] == kind].T
+        law = resistance(shares, 1.0, np.full(len(shares), kind), ratio, "nan").length
+        known = np.isfinite(law)
+        if known.any():
+            of_kind = np.interp(share, shares[known], lengths[known] / law[known])
+            factor = np.where(touches == kind, of_kind, factor)
+    return factor
 
 
 def share_range(spanned: bool) -> tuple[float, float]:

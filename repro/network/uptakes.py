@@ -15,7 +15,7 @@ along the aggregate if it is not (large P). The second one is the drop that diff
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ from repro.model.kinetics import RateLaw, rate_law
 from repro.network.arguments import SHARE, Check, area_share
 from repro.network.resistance import is_plug, share_range
 from repro.results import M_PER_D
-from repro.scene import load_scene
+from repro.scene import Scene, load_scene
 
 
 class Transport(NamedTuple):
@@ -46,9 +46,41 @@ TRANSPORTS = Transport(8.5, 0.364, 1.05, 0.57), Transport(12.7, 2.18, 0.529, 0.2
 UPTAKE_BOUND, FAST = 0.0761, 0.02
 #: Ranges of the uptake: widths (um), mean velocities (m/d) and supplies (mg/L).
 WIDTHS, FASTEST, LARGEST_SUPPLY = (40.0, 150.0), 10.0, 20.0
-#: Halvings of the interval of the donor's uptake, and of that of the acceptor's for decay, which
-#: is a few per cent of its uptake.
-HALVINGS, DECAY_HALVINGS = 24, 12
+#: Largest errors of the uptakes of donor and acceptor, over the intervals that contain them. Every
+#: third step of the search halves an interval, so that 72 steps reach the error.
+ERROR, MOST_STEPS = 2.0**-24, 72
+
+
+class Law(NamedTuple):
+    """The law of uptake with the kinetics of a scene.
+
+    rates: (7)-(10); diffusivities: of acceptor and donor in the aggregate, um2/h; transports: those
+    before contact and after it; bound: least relative bound of the uptake; widths: um; supplies:
+    largest ones of acceptor and donor, mg/L; share: largest A / W^2.
+    """
+
+    rates: RateLaw
+    diffusivities: tuple[float, ...]
+    transports: tuple[Transport, ...]
+    bound: float
+    widths: tuple[float, float]
+    supplies: tuple[float, ...]
+    share: float
+
+
+def law_of(scene: Scene, transports: tuple[Transport, ...], bound: float,
+           widths: tuple[float, float], supplies: tuple[float, ...], share: float) -> Law:
+    """Return the law with the kinetics and the diffusivities of a scene."""
+    inside = (kind.diffusivity_in_aggregate for kind in scene.substrates.modelled.values())
+    return Law(rate_law(scene.substrates, scene.kinetics), tuple(inside), transports, bound, widths,
+               supplies, share)
+
+
+@cache
+def table_1() -> Law:
+    """Return the law with the kinetics of Table 1."""
+    return law_of(load_scene("base"), TRANSPORTS, UPTAKE_BOUND, WIDTHS, (LARGEST_SUPPLY,) * 2,
+                  share_range(True)[1])
 
 
 class Uptake(NamedTuple):
@@ -64,58 +96,20 @@ class Uptake(NamedTuple):
     bound: np.ndarray
 
 
-def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: ArrayLike,
-           donor: ArrayLike, *, outside: str = "raise") -> Uptake:
-    """Uptake of both substrates by aggregates in throats, and the growth that follows from it.
-
-    Parameters
-    ----------
-    area : array_like
-        Areas of the aggregates, um^2, of any shape; zero in an empty throat.
-    width : array_like
-        Widths of the throats, um. Its shape broadcasts with the areas.
-    velocity : array_like
-        Mean velocities in the throats, m/d. Its shape broadcasts with the areas.
-    acceptor, donor : array_like
-        Supplies: concentrations in the water that enters the throats, mg/L. Their shapes broadcast
-        with the areas.
-    outside : {"raise", "nan"}
-        As for :func:`added_resistance`.
-
-    Returns
-    -------
-    Uptake
-        Arrays of the broadcast shape.
-
-    Raises
-    ------
-    ValueError
-        If a throat is outside the law's range: area / width^2 to 4.5, width 40 to 150 um, velocity
-        to 10 m/d, supplies to 20 mg/L.
-
-    Notes
-    -----
-    The kinetics and diffusivities are those of Table 1, with X_A = X_m and steady profiles. The
-    effluent of a throat has the supply less uptake / (velocity width).
-
-    Examples
-    --------
-    >>> import repro
-    >>> taken = repro.uptake([0.0, 500.0, 4000.0], 50.0, 1.0, 8.0, 5.0)
-    >>> bool(taken.growth[0] == 0 and (taken.growth[1:] > 0).all())
-    True
-    """
+def uptake(law: Law, area: ArrayLike, width: ArrayLike, velocity: ArrayLike, acceptor: ArrayLike,
+           donor: ArrayLike, outside: str = "raise") -> Uptake:
+    """Uptake by a law; arguments as for :func:`repro.uptake`."""
     area, width, velocity, acceptor, donor = np.broadcast_arrays(
         *(np.asarray(values, float) for values in (area, width, velocity, acceptor, donor)))
     check = Check("uptake", outside)
-    ranges = (("width", width, *WIDTHS),
-              (SHARE, area_share(area, width), 0.0, share_range(True)[1]),
+    ranges = (("width", width, *law.widths),
+              (SHARE, area_share(area, width), 0.0, law.share),
               ("velocity", velocity, 0.0, FASTEST),
-              ("acceptor", acceptor, 0.0, LARGEST_SUPPLY),
-              ("donor", donor, 0.0, LARGEST_SUPPLY))
+              ("acceptor", acceptor, 0.0, law.supplies[0]),
+              ("donor", donor, 0.0, law.supplies[1]))
     is_known = np.all([check.within(*each) for each in ranges], axis=0)
     takes = is_known & (area > 0) & (velocity > 0) & (acceptor > 0)
-    throats = Throats(area, width, velocity, np.stack([acceptor, donor]))
+    throats = Throats(area, width, velocity, np.stack([acceptor, donor]), law)
     results = np.full((4, *area.shape), np.nan)
     results[:3, is_known] = 0.0
     results[:3, takes] = throats.where(takes).uptake()
@@ -128,14 +122,14 @@ class Throats:
     """Throats with aggregates.
 
     area: (n,) um2; width: (n,) um; velocity: (n,) m/d; supplies: (2, n) mg/L of acceptor and donor;
-    transports: constants before contact and after it.
+    law: the law of their uptake.
     """
 
     area: np.ndarray
     width: np.ndarray
     velocity: np.ndarray
     supplies: np.ndarray
-    transports: tuple[Transport, Transport] = TRANSPORTS
+    law: Law = field(default_factory=table_1)
 
     @cached_property
     def share(self) -> np.ndarray:
@@ -150,11 +144,11 @@ class Throats:
     def where(self, selected: np.ndarray) -> Throats:
         """Select throats."""
         return Throats(self.area[selected], self.width[selected], self.velocity[selected],
-                       self.supplies[:, selected], self.transports)
+                       self.supplies[:, selected], self.law)
 
     def uptake(self) -> np.ndarray:
         """(3, n) uptake of acceptor and donor, um2 mg/L/h, and growth of the area, um2/h."""
-        kinetics = _rates().constants
+        kinetics = self.law.rates.constants
         donor = self._donor_uptake()
         acceptor = self._acceptor_uptake(donor)
         need = kinetics.acceptor_to_donor_ratio * donor
@@ -164,31 +158,32 @@ class Throats:
 
     def bound(self) -> np.ndarray:
         """(n,) relative bound of the uptakes."""
-        return UPTAKE_BOUND * self.spread()
+        return self.law.bound * self.spread()
 
     def spread(self) -> np.ndarray:
         """(n,) bound over its least value."""
-        peclet = self.inflow / _diffusivities()[1]
+        peclet = self.inflow / self.law.diffusivities[1]
         return 1 + np.where(is_plug(self.share), 0.0, FAST * (peclet * self.share)**2)
 
     def _donor_uptake(self) -> np.ndarray:
         """(n,) uptake of the donor, by which both concentrations in the aggregate fall."""
-        acceptor_limit, donor_limit = self.inflow * self.supplies
-        most = np.minimum(acceptor_limit / _rates().constants.acceptor_to_donor_ratio, donor_limit)
+        acceptor_limit, donor_limit = self._inflows
+        ratio = self.law.rates.constants.acceptor_to_donor_ratio
+        most = np.minimum(acceptor_limit / ratio, donor_limit)
         _, fastest = self._uptake_at(*self.supplies)
 
         def rate(donor: np.ndarray) -> np.ndarray:
             acceptor = self._concentration(0, self._acceptor_uptake(donor))
             return self._uptake_at(acceptor, self._concentration(1, donor))[1]
 
-        return _balance(np.zeros_like(most), np.minimum(most, fastest), HALVINGS, rate)
+        return _balance(np.zeros_like(most), np.minimum(most, fastest), rate)
 
     def _acceptor_uptake(self, donor: np.ndarray) -> np.ndarray:
         """(n,) uptake of the acceptor: for the uptake of the donor (n,), and for decay."""
-        need = _rates().constants.acceptor_to_donor_ratio * donor
+        need = self.law.rates.constants.acceptor_to_donor_ratio * donor
         spare = np.maximum(self.inflow * self.supplies[0] - need, 0.0)
         most = need + np.minimum(self._largest_demand_of_decay, spare)
-        return _balance(need, most, DECAY_HALVINGS, lambda acceptor: (
+        return _balance(need, most, lambda acceptor: (
             need + self._demand_of_decay(self._concentration(0, acceptor))))
 
     def _demand_of_decay(self, acceptor: np.ndarray) -> np.ndarray:
@@ -201,47 +196,66 @@ class Throats:
 
     def _uptake_at(self, acceptor: np.ndarray, donor: np.ndarray) -> np.ndarray:
         """(2, n) uptake of acceptor and donor at concentrations in the aggregates."""
-        biomass = _rates().constants.maximum_density * self.area
-        return biomass * np.stack(_rates().uptake(acceptor, donor))
+        biomass = self.law.rates.constants.maximum_density * self.area
+        return biomass * np.stack(self.law.rates.uptake(acceptor, donor))
 
     def _concentration(self, substrate: int, consumed: np.ndarray) -> np.ndarray:
         """(n,) mg/L in the aggregates that take up (n,) um2 mg/L/h of acceptor (0) or donor (1)."""
-        sherwood, power, plug, plug_power = self._transport
-        supply, diffusivity = self.supplies[substrate], _diffusivities()[substrate]
-        unmixed = plug * self.inflow / diffusivity * self.share**plug_power
-        used = np.divide(consumed, self.inflow * supply, out=np.zeros_like(consumed),
-                         where=supply > 0)
+        supply, inflow = self.supplies[substrate], self._inflows[substrate]
+        unmixed, resistance = self._unmixed[substrate], self._resistances[substrate]
+        used = np.divide(consumed, inflow, out=np.zeros_like(consumed), where=supply > 0)
         used = np.clip(used, 1e-12, 1 - 1e-12)
         mean = (1 - used - unmixed * used / np.log1p(-used)) / (1 + unmixed)
-        resistance = 1 / (sherwood * self.share**power * diffusivity)
         return np.maximum(supply * mean - consumed * resistance, 0.0)
+
+    @cached_property
+    def _inflows(self) -> np.ndarray:
+        """(2, n) inflow of both substrates, um2 mg/L/h."""
+        return self.inflow * self.supplies
+
+    @cached_property
+    def _unmixed(self) -> np.ndarray:
+        """(2, n) P of both substrates."""
+        _, _, plug, plug_power = self._transport
+        return plug * self.inflow * self.share**plug_power / self._diffusivity
+
+    @cached_property
+    def _resistances(self) -> np.ndarray:
+        """(2, n) 1 / (S D) of both substrates, h/um2."""
+        sherwood, power, _, _ = self._transport
+        return 1 / (sherwood * self.share**power * self._diffusivity)
+
+    @property
+    def _diffusivity(self) -> np.ndarray:
+        """(2, 1) of both substrates in the aggregate, um2/h."""
+        return np.array(self.law.diffusivities)[:, None]
 
     @cached_property
     def _transport(self) -> np.ndarray:
         """(4, n) the constants of each aggregate."""
-        before, after = (np.array(kind)[:, None] for kind in self.transports)
+        before, after = (np.array(kind)[:, None] for kind in self.law.transports)
         return np.where(is_plug(self.share), after, before)
 
 
-def _balance(low: np.ndarray, high: np.ndarray, halvings: int, rate: Callable) -> np.ndarray:
-    """(n,) x between low and high with rate(x) = x, for a rate that falls with x."""
-    for _ in range(halvings):
-        middle = 0.5 * (low + high)
-        exceeds = rate(middle) > middle
-        low, high = np.where(exceeds, middle, low), np.where(exceeds, high, middle)
-    return 0.5 * (low + high)
+def _balance(low: np.ndarray, high: np.ndarray, rate: Callable) -> np.ndarray:
+    """(n,) x between low and high with rate(x) = x, for a rate that falls with x.
 
-
-@cache
-def _rates() -> RateLaw:
-    """Rates of Table 1."""
-    scene = load_scene("base")
-    return rate_law(scene.substrates, scene.kinetics)
-
-
-@cache
-def _diffusivities() -> tuple[float, float]:
-    """Diffusivities of acceptor and donor in the aggregate (um2/h) of Table 1."""
-    substrates = load_scene("base").substrates
-    return (substrates.acceptor.diffusivity_in_aggregate,
-            substrates.donor.diffusivity_in_aggregate)
+    Regula falsi in Illinois's form: the value at an end that stays twice counts half. The slope of
+    rate(x) - x is -1 or less, so that x errs by at most rate(x) - x, and by at most high - low.
+    """
+    error = ERROR * (high - low)
+    over, under = rate(low) - low, rate(high) - high
+    previous = np.zeros_like(low)
+    for step in range(MOST_STEPS):
+        part = np.divide(over, over - under, out=np.full_like(low, 0.5), where=over > under)
+        x = low + (high - low) * (0.5 if step % 3 == 2 else np.clip(part, 0.0, 1.0))
+        excess = rate(x) - x
+        if (np.minimum(np.abs(excess), high - low) <= error).all():
+            break
+        side = np.sign(excess)
+        weight = np.where(side == previous, 0.5, 1.0)
+        low, high = np.where(side >= 0, x, low), np.where(side <= 0, x, high)
+        over = np.where(side >= 0, excess, weight * over)
+        under = np.where(side <= 0, excess, weight * under)
+        previous = side
+    return x

@@ -17,7 +17,8 @@ from repro.fem.mesher import unlocked
 from repro.fem.walls import channel_walls
 from repro.model.meshing import sized
 from repro.model.uptake_law import Values
-from repro.network.resistance import added_resistance, share_range
+from repro.network.resistance import share_range
+from repro.network.throats import added_resistance
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, claim
 from verification.claims.base_run import upstream_means

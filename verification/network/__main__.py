@@ -7,6 +7,7 @@ if a test shape lies outside the law's bounds.
 An argument selects another task:
 
     uptake     solves the states of the law of uptake, and fits and judges this law
+    own        judges the laws of two scenes with other kinetics; the exit status is 1 if a state is outside the bounds
     histories  writes the histories of the throats in the example with OpenPNM, in the environment of `make network`
     expected   writes the law and its bounds for ten of the throats
     throats    runs the ten throats, and compares them with the law; the exit status is 1 if a bound does not hold
@@ -20,7 +21,7 @@ from pathlib import Path
 from repro.network.resistance import TABLE
 from repro.network.uptakes import TRANSPORTS, UPTAKE_BOUND
 from repro.results import write_table, write_text
-from verification.network import histories, law, page, runs, throats, timed, uptakes
+from verification.network import histories, law, own, page, runs, throats, timed, uptakes
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
@@ -28,7 +29,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 def main() -> int:
     """Entry point; returns the exit status."""
     commands = {"uptake": uptake_law, "histories": write_histories, "expected": write_expected,
-                "throats": run_throats, "sweep": time_sweep}
+                "throats": run_throats, "sweep": time_sweep, "own": judge_own}
     return commands[sys.argv[1]]() if sys.argv[1:] else resistance()
 
 
@@ -56,6 +57,13 @@ def uptake_law() -> int:
     apart, bounds = uptakes.judged()
     print(f"{(apart <= bounds).sum()} of {len(bounds)} states that the fit has not seen are within its bound")
     return int((apart > bounds).any())
+
+
+def judge_own() -> int:
+    """Judge the laws of two scenes with other kinetics."""
+    record = own.write()
+    write_text(PAGE, page.text())
+    return int(any(scene["own"]["within"] < scene["own"]["states"] for scene in record.values()))
 
 
 def write_expected() -> int:

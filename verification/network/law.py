@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from repro.network.resistance import added_resistance, share_range
+from repro.network.resistance import share_range
+from repro.network.throats import added_resistance
 from repro.results import read_table
 from verification.network import shapes
 from verification.network.shapes import RATIOS, Growth, Sample, log_uniform, select

@@ -16,8 +16,7 @@ import numpy as np
 from repro.errors import RunEnd
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.network.resistance import added_resistance
-from repro.network.uptakes import uptake
+from repro.network.throats import added_resistance, uptake
 from repro.results import M_PER_D, read_table
 from repro.scene import Scene, load_scene
 from verification.claims.runs import SUBSTRATES, rows_at

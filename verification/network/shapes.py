@@ -5,12 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repro.fem.space import Space
 from repro.march.simulation import simulate
-from repro.model import flow
 from repro.model.meshing import seeded
 from repro.model.pore import Pore
-from repro.model.resistance import Viscous
+from repro.network.own import added_length
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES, until
 
@@ -99,13 +97,6 @@ def sample(pore: Pore, ratios: tuple[float, ...] = RATIOS, run: Growth | None = 
     """The added lengths of an aggregate in its mesh."""
     share = pore.boundary.area / pore.mesh.width**2
     return Sample(run, pore.contact, share, ratios, tuple(added_length(pore.space, ratio) for ratio in ratios))
-
-
-def added_length(space: Space, ratio: float) -> float:
-    """r: the loss of the meshed part over that of an empty one of length W, less its own length over W."""
-    mesh = space.mesh
-    loss = flow.unit_flow(space, Viscous(ratio)).loss
-    return loss / flow.poiseuille_loss(mesh.width, mesh.width) - (mesh.ends[1] - mesh.ends[0]) / mesh.width
 
 
 def half_disc(thickness: float, width: float = WIDTH, position: float = 0.0, elements=FINE) -> Pore:

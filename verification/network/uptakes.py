@@ -5,20 +5,19 @@ A part of the states gives the constants of the law. The other part tests it.
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from repro.march.ends import PoreEnd
 from repro.march.folding import Fold
 from repro.model import solving
 from repro.model.meshing import seeded
 from repro.model.pore import Pore
+from repro.network import own
 from repro.network.resistance import is_plug
-from repro.network.uptakes import Throats, Transport
+from repro.network.uptakes import TRANSPORTS, Throats, Transport, table_1
 from repro.results import read_table
 from repro.scene import load_scene
 from verification.claims.runs import SUBSTRATES
@@ -41,8 +40,6 @@ RUNS, STATES = {FIT: 4, NEW: 2}, {FIT: 3, NEW: 1}
 APART, LARGEST = 1.2, 4.5
 #: Number of grown shapes in NEW, drawn evenly from all of its runs.
 NEW_GROWN = 25
-#: The bound of the law is the largest error of the fit, over the spread of the bound, times this factor.
-FACTOR = 1.25
 #: Part by which the least sum of squares may be less than that of the law's constants. Few states are plugs, and the
 #: halvings of the law's intervals move their sum of squares by up to a third.
 FLAT = 0.25
@@ -90,29 +87,29 @@ def read(part: int) -> dict[str, np.ndarray]:
     return select(columns, columns["part"] == part)
 
 
-def throats(columns: dict[str, np.ndarray]) -> Throats:
+def throats(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport] = TRANSPORTS) -> Throats:
     """The throats of some states."""
     supplies = np.array([columns[name] for name in SUBSTRATES])
-    return Throats(columns["area"], columns["width"], columns["velocity"], supplies)
+    law = table_1()._replace(transports=transports)
+    return Throats(columns["area"], columns["width"], columns["velocity"], supplies, law)
 
 
-def deviations(columns: dict[str, np.ndarray], law: Throats) -> np.ndarray:
-    """(2, n) ln of the uptake of acceptor and donor over that of the law."""
-    solutions = np.array([columns[f"{name}_uptake"] for name in SUBSTRATES])
-    return np.log(solutions / law.uptake()[:2])
+def solutions(columns: dict[str, np.ndarray]) -> np.ndarray:
+    """(2, n) the uptakes of acceptor and donor."""
+    return np.array([columns[f"{name}_uptake"] for name in SUBSTRATES])
 
 
 def fitted(columns: dict[str, np.ndarray]) -> tuple[Transport, Transport]:
-    """The constants before and after contact, to three digits. The fit minimises the squares of the deviations over the
-    spread of the bound."""
+    """The constants before and after contact."""
     spanned = is_plug(throats(columns).share)
-    return _fitted(columns, ~spanned), _fitted(columns, spanned)
+    before, after = (select(columns, rows) for rows in (~spanned, spanned))
+    return own.fit(throats(before), solutions(before), START), own.fit(throats(after), solutions(after), START)
 
 
 def misfit(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport]) -> np.ndarray:
     """(2,) sums, before contact and after it, of the squares that the fit minimises."""
-    law = replace(throats(columns), transports=transports)
-    squares = ((deviations(columns, law) / law.spread())**2).sum(axis=0)
+    law = throats(columns, transports)
+    squares = ((own.deviations(law, solutions(columns)) / law.spread())**2).sum(axis=0)
     spanned = is_plug(law.share)
     return np.array([squares[~spanned].sum(), squares[spanned].sum()])
 
@@ -122,37 +119,16 @@ def is_fit(columns: dict[str, np.ndarray], transports: tuple[Transport, Transpor
     return bool((misfit(columns, transports) <= (1 + FLAT) * misfit(columns, fitted(columns))).all())
 
 
-def _fitted(columns: dict[str, np.ndarray], selected: np.ndarray) -> Transport:
-    chosen = select(columns, selected)
-    spread = throats(chosen).spread()
-
-    def residuals(logarithms: np.ndarray) -> np.ndarray:
-        one = _constants(logarithms)
-        return (deviations(chosen, replace(throats(chosen), transports=(one, one))) / spread).ravel()
-
-    start = [np.log(START.sherwood), START.power, np.log(START.plug), START.plug_power]
-    logarithms = least_squares(residuals, start, diff_step=1e-2, xtol=1e-6, ftol=1e-6).x
-    return Transport(*(float(f"{value:.3g}") for value in _constants(logarithms)))
-
-
-def _constants(logarithms: np.ndarray) -> Transport:
-    """The constants of the fit's unknowns: both factors are positive."""
-    sherwood, power, plug, plug_power = logarithms
-    return Transport(np.exp(sherwood), power, np.exp(plug), plug_power)
-
-
 def bound(columns: dict[str, np.ndarray], transports: tuple[Transport, Transport]) -> float:
-    """The law's least bound, to three digits: FACTOR times the largest deviation of the fit over its spread."""
-    law = replace(throats(columns), transports=transports)
-    apart = np.expm1(np.abs(deviations(columns, law))).max(axis=0)
-    return float(f"{FACTOR * (apart / law.spread()).max():.3g}")
+    """The law's least bound, to three digits."""
+    return own.bound(throats(columns, transports), solutions(columns))
 
 
 def judged(part: int = NEW) -> tuple[np.ndarray, np.ndarray]:
     """(n,) the larger relative deviation of acceptor and donor from the law, and (n,) its bound."""
     columns = read(part)
     law = throats(columns)
-    return np.expm1(np.abs(deviations(columns, law))).max(axis=0), law.bound()
+    return np.expm1(np.abs(own.deviations(law, solutions(columns)))).max(axis=0), law.bound()
 
 
 def _grown(run: Growth) -> Iterator[Pore]:
