@@ -51,7 +51,7 @@ class Refined:
                        _within(self.local[parts], local).reshape(-1, 2))
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class _Parts:
     """Triangles (T, 3) between corners (N, 2) um, in triangles of a mesh; middles: the corner
     between two others (smaller number first) whose edge was cut."""
@@ -82,8 +82,8 @@ def refined(mesh: Mesh, outlines: Sequence[Outline],
     unit = elements.nodes(1)
     parts = _Parts(mesh.points[: mesh.corners], mesh.triangles, np.arange(len(mesh.triangles)),
                    np.tile(unit, (len(mesh.triangles), 1, 1)), {})
-    while _bisect(mesh, parts, size):
-        pass
+    while (cut := _bisected(mesh, parts, size)) is not parts:
+        parts = cut
     finer = []
     loops = []
     for outline, loop in zip(outlines, mesh.straight.topology.loops):
@@ -95,15 +95,15 @@ def refined(mesh: Mesh, outlines: Sequence[Outline],
     return Refined(_meshed(mesh, parts, tuple(loops), finer), finer, parts.owner, parts.local)
 
 
-def _bisect(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray]) -> bool:
+def _bisected(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray]) -> _Parts:
     """Cut the longest edges of triangles that are too large, and those that keep the mesh without
-    hanging nodes; False if there are none."""
+    hanging nodes. The parts themselves if there are none."""
     triangles = parts.triangles
     corners = parts.points[triangles]
     lengths = np.linalg.norm(corners[:, elements.NEXT] - corners, axis=2)
     large = lengths.max(axis=1) > SPLIT * size(corners.mean(axis=1))
     if not large.any():
-        return False
+        return parts
     # The longest edge 01 first: both triangles beside an edge compare the same lengths.
     turn = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
     rows = np.arange(len(triangles))[:, None]
@@ -121,8 +121,7 @@ def _bisect(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray])
     triangle, side = np.divmod(first[cut], 3)
     between = 0.5 * (local + local[:, elements.NEXT])
     added = _mapped(mesh, parts.owner[triangle], between[triangle, side])
-    parts.points = np.vstack([parts.points, added])
-    parts.middles.update(zip(map(tuple, edges[cut].tolist()), new[cut].tolist()))
+    cut_at = dict(zip(map(tuple, edges[cut].tolist()), new[cut].tolist()))
 
     middle = new[edge]
     is_cut = middle >= 0
@@ -134,10 +133,11 @@ def _bisect(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray])
               (is_cut[:, 0] & is_cut[:, 2], (0, m, n)), (is_cut[:, 0] & is_cut[:, 2], (n, m, 2)),
               (is_cut[:, 0] & ~is_cut[:, 1], (m, 1, 2)),
               (is_cut[:, 0] & is_cut[:, 1], (m, 1, k)), (is_cut[:, 0] & is_cut[:, 1], (m, k, 2))]
-    parts.triangles = np.concatenate([numbers[chosen][:, own] for chosen, own in pieces])
-    parts.local = np.concatenate([places[chosen][:, own] for chosen, own in pieces])
-    parts.owner = np.concatenate([parts.owner[chosen] for chosen, _ in pieces])
-    return True
+    return _Parts(np.vstack([parts.points, added]),
+                  np.concatenate([numbers[chosen][:, own] for chosen, own in pieces]),
+                  np.concatenate([parts.owner[chosen] for chosen, _ in pieces]),
+                  np.concatenate([places[chosen][:, own] for chosen, own in pieces]),
+                  parts.middles | cut_at)
 
 
 def _mapped(mesh: Mesh, owner: np.ndarray, local: np.ndarray) -> np.ndarray:

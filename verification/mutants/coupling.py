@@ -56,7 +56,7 @@ MUTANTS = (
         "repro/fem/refinement.py",
         ("hanging-nodes",
          "A triangle beside a cut edge stays whole.",
-         "_bisect",
+         "_bisected",
          "cut[edge].any(axis=1) & ~cut[edge[:, 0]]",
          "np.zeros(len(edge), bool)",
          f"{PARTS_TESTS}no_edge_is_longer_than_the_size_around_it_and_no_node_hangs[2-two]"),
