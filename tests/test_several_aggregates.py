@@ -401,7 +401,7 @@ TOLERANCE = {"fast": 0.01, "paper": 0.02}
 
 
 @pytest.mark.parametrize("preset", ["fast", pytest.param("paper", marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("forces", ["neglected", "included"])
+@pytest.mark.parametrize("forces", ["neglected", pytest.param("included", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("what", BODIES)
 def test_order_names_and_walls_of_bodies_change_no_column(preset, forces, what):
     sections = {"numerics": {"preset": preset}, "growth": {"end": "1 h", "fluid_forces": forces}}
@@ -473,6 +473,7 @@ def test_a_packed_state_is_that_state(bodies):
         assert np.array_equal(body.theta, other.theta) and np.array_equal(body.reference, other.reference)
 
 
+@pytest.mark.thorough
 def test_commands_know_bodies(tmp_path, capsys):
     """check, run, resume to a later end, plot, compare and sweep of a file with two bodies."""
     path = tmp_path / "two.toml"
