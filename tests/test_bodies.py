@@ -301,6 +301,7 @@ def test_an_aggregate_that_a_jump_of_the_flow_takes_away_leaves_at_the_jump(sche
     assert left.end == 1.0 and left.biomass_after == pytest.approx(0.0, abs=1e-6 * left.detached)
 
 
+@pytest.mark.thorough
 def test_an_aggregate_on_both_walls_does_not_leave():
     """A wall that gives way would set its surface free, and the model has no law for that: the run ends."""
     scene = load_scene("base", ["numerics.preset=fast", "pore.width=20 um", 'growth.end="12 h"', "growth.wall=bonded",

@@ -427,6 +427,7 @@ def test_order_names_and_walls_of_bodies_change_no_column(preset, forces, what):
     assert compared > 35
 
 
+@pytest.mark.thorough
 def test_columns_of_a_body_that_has_left_are_empty(tmp_path):
     """The first body leaves, then the second one. Sums, balances, fields and files go on without them."""
     growth = {"end": "1 h", "wall": "bonded", "fluid_forces": "included", "bonding_strength": "500 Pa",
