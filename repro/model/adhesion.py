@@ -15,9 +15,9 @@ mesh is refined. The tensile stress is a weighted mean over the points within W 
 A new mesh takes over a shape that was in equilibrium on the old mesh. Its stresses at contact lines
 then err by up to 185 % (``growth-gold-contact``), and elements that are longer than the means do
 not see the singularity at the edge of a bonded wall: tractions erred by 30 to 55 %
-(``growth-gold-bonded``). So both stresses are those of the equilibrium on finer triangles beside
-all contact lines, with the same contact surfaces and the forces of the water around this shape. The
-run itself keeps its mesh.
+(``growth-gold-bonded``). So both stresses belong to an equilibrium of their own. Its triangles are
+small beside all contact lines. Its contact surfaces are those of the run, and the water around it
+exerts its forces. The run keeps its mesh.
 
 Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
 stress of growth alone.
@@ -183,7 +183,7 @@ def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
 def with_finer_lines(pore: Pore, size: float) -> Pore:
     """The aggregates in the same shapes, with triangles of a size (um) beside all contact lines.
 
-    Nothing changes but the mesh. It has neither masses nor substrates.
+    Only the mesh changes. The result has neither masses nor substrates.
     """
     old = pore.mesh
     lines = np.concatenate([outline.points[outline.contact_ends] for outline in pore.outlines])
@@ -233,7 +233,7 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
     rest = with_finer_lines(pore, LENGTH * pore.mesh.width / ELEMENTS_ALONG)
     forces = None
     if loading.growth.has_fluid_forces:
-        # The velocity of the solution: at a jump, the scene has the head after it alone.
+        # The solution's velocity drives this flow. At a jump the scene has only the head after it.
         driven = replace(at_time(needed(loading.drive, "[flow]"), pore.time),
                          mean_velocity=solved.mean_velocity)
         water = flow.solve(rest.space, driven, loading.length, interface=loading.interface)

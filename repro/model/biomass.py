@@ -101,21 +101,14 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 def _inside(old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
     """Transfer the shares of the biomass to smaller aggregates within the old ones, whose density
     is X_m everywhere."""
-    total = amounts[0] + amounts[1]
-    share = old.integration.to_nodes(amounts[1] / total)[:, None]
-    nodal = new.mesh.from_body(at.field(share, old.mesh.cells[old.mesh.biomass]))[:, 0]
     masses = density * new.reaction.dx
-    inert = np.clip(new.integration.to_points(nodal), 0.0, 1.0) * masses
+    inert = _shares(old, new, at, amounts[:2])[0] * masses
     return masses - inert, inert
 
 
 def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
     """Transfer the shares of the biomass; the new mesh has the density X_m everywhere."""
-    total = amounts[0] + amounts[1]
-    shares = np.column_stack([old.integration.to_nodes(amount / total)
-                              for amount in amounts[1:]])
-    nodal = new.mesh.from_body(at.field(shares, old.mesh.cells[old.mesh.biomass]))
-    inside = [np.clip(new.integration.to_points(column), 0.0, 1.0) for column in nodal.T]
+    inside = _shares(old, new, at, amounts)
     masses = density * new.reaction.dx
     transferred = [np.zeros_like(masses) for _ in amounts]
     for before, after in zip(old.mesh.regions, new.mesh.regions):
@@ -128,6 +121,16 @@ def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts, density: f
         for new_amount, share, amount in zip(transferred[2:], rest, amounts[2:]):
             new_amount[rows] = _scaled(share * masses[rows], amount[were].sum())
     return tuple(transferred)
+
+
+def _shares(old: Space, new: Space, at: Located, amounts: Amounts) -> list[np.ndarray]:
+    """Interpolate shares of the biomass to the points of the new mesh: one (r, q) for the inert
+    mass, and one for each further amount."""
+    total = amounts[0] + amounts[1]
+    shares = np.column_stack([old.integration.to_nodes(amount / total)
+                              for amount in amounts[1:]])
+    nodal = new.mesh.from_body(at.field(shares, old.mesh.cells[old.mesh.biomass]))
+    return [np.clip(new.integration.to_points(column), 0.0, 1.0) for column in nodal.T]
 
 
 def _by_densities(carried: Callable[..., np.ndarray], old: Space, new: Space, at: Located,

@@ -176,8 +176,8 @@ def solved(scene: Scene, random: np.random.Generator,
                 unresolved += 1
             show(len(states) + unresolved, len(bodies))
     if unresolved:
-        warnings.warn(f"{scene.name}: {unresolved} of {len(bodies)} states of the laws for networks "
-                      "have fronts thinner than an element, and the bounds leave them out",
+        warnings.warn(f"{scene.name}: {unresolved} of {len(bodies)} states of the laws for "
+                      "networks have fronts thinner than an element, and the bounds leave them out",
                       stacklevel=5)
     ratio, interface = scene.flow.viscosity_ratio, interface_of(scene.numerics.interface)
     shapes = [[pore.contact, pore.boundary.area / pore.mesh.width**2,
