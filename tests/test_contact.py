@@ -294,6 +294,49 @@ def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(pl
     assert kept == pytest.approx(asked, rel=1e-9)
 
 
+def with_line_size(scene, pore, size, advances, factor=1.3):
+    """The new shape with triangles of a size beside the lines, where these are expected."""
+    search = contact_lines.SearchOptions(advances=advances, line_size=size)
+    return contact.expand(Mechanics.of(scene), pore, [factor * pore.body.theta], search=search)
+
+
+def test_lines_have_small_triangles_where_they_go(plugged):
+    """The arcs ahead are 2 to 3 um long, and lines that travel 5 um err by 0.1 um on them. With small triangles their
+    places converge, whatever place was expected. The material keeps its nodes and its masses."""
+    scene, pore = plugged
+    coarse = expanded_by(scene, pore, 1.3)
+    far = {key: 1.2 * advance for key, advance in coarse.advances.items()}
+    reached = [with_line_size(scene, pore, size, advances)
+               for size, advances in ((0.1, coarse.advances), (0.1, far), (0.05, coarse.advances))]
+    lengths = np.array([[shape.advances[0, TOP, side] for side in (1, -1)] for shape in (coarse, *reached)])
+    exact = lengths[-1]
+    assert np.abs(lengths[0] - exact).max() > 0.02 > 3 * np.abs(lengths[1:3] - exact).max()
+    for shape in reached:
+        outline = shape.pore.boundary
+        ends = outline.contact_ends & (outline.wall == TOP)
+        assert ends.sum() == 2 and outline.corners.edge_lengths().min() < 0.3
+        assert shape.position.shape == pore.mesh.points.shape
+        assert np.abs(shape.position - coarse.position)[pore.mesh.body].max() < 0.3
+        assert shape.amounts(pore.active, pore).sum() == pytest.approx(pore.active.sum(), rel=1e-12)
+
+
+def test_the_triangles_of_the_mesh_take_over_from_the_small_ones(plugged, monkeypatch):
+    """If there is no equilibrium on small triangles, the lines are those on the mesh."""
+    scene, pore = plugged
+    on_mesh = expanded_by(scene, pore, 1.05)
+    expand = contact._expand
+
+    def only_on_the_mesh(mechanics, grown, *rest):
+        if grown.mesh.topology is not pore.mesh.topology:
+            raise GrowthError("no equilibrium on small triangles")
+        return expand(mechanics, grown, *rest)
+
+    monkeypatch.setattr(contact, "_expand", only_on_the_mesh)
+    shape = with_line_size(scene, pore, 0.1, on_mesh.advances, 1.05)
+    assert shape.bisection is None
+    assert shape.advances == pytest.approx(on_mesh.advances, abs=0.02)
+
+
 @pytest.mark.thorough
 def test_a_run_stops_within_a_step_in_contact(plugged, tmp_path):
     """At most three systems (motion of the mesh, flow, substrates) are factorised between two polls. A run that stops

@@ -10,6 +10,7 @@ from repro import results
 from repro.fem import elements
 from repro.march.state import Report
 from repro.model import adhesion, contact, remeshing
+from repro.model.finer_lines import with_finer_lines
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
@@ -42,15 +43,18 @@ def test_stresses_are_those_of_the_equilibrium_on_a_new_mesh(monkeypatch):
         assert computed == pytest.approx(peaks(loading, rest, None)[0].value, rel=1e-12)
 
 
-def test_theta_of_parts_stays_within_that_of_their_triangles():
+def test_theta_of_parts_stays_positive_and_keeps_its_sum():
     """A new mesh leaves theta rough beside the edge of a bonded wall. The linear function that fits it in a triangle
     may be negative, and no equilibrium exists then."""
     _, pore = coarse_base(2)
     fitted = elements.linear_fit(pore.body.solid.shape.table)
     theta = np.where(fitted[0] < 0, 40.0, 1.0) * np.ones_like(pore.body.theta)
     assert (theta @ fitted.T).min() < 0
-    parts = adhesion.with_finer_lines(pore.with_body(theta=theta), 0.4).body.theta
-    assert parts.min() >= 1.0 and parts.max() <= 40.0 and np.ptp(parts) > 10.0
+    corner = pore.mesh.points[pore.region.loop[:1]]
+    fine, _ = with_finer_lines(pore.with_body(theta=theta), corner, 0.4, 0.25)
+    parts = fine.body.theta
+    assert 0.1 < parts.min() and parts.max() < 400 and np.ptp(parts) > 10.0
+    assert np.sum(parts * fine.body.solid.at.dx) == pytest.approx(np.sum(theta * pore.body.solid.at.dx), rel=1e-12)
 
 
 def test_stresses_on_walls_are_computed_only_for_a_scene_with_a_strength(monkeypatch):

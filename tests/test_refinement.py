@@ -8,9 +8,11 @@ from repro.fem import elements
 from repro.fem.refinement import refined
 from repro.fem.sizing import GRADATION, SPLIT
 from repro.fem.walls import numbered
-from repro.model import adhesion, contact
+from repro.model import contact, mesh_motion, remeshing
+from repro.model.finer_lines import with_finer_lines
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
+from repro.model.remeshing import Remeshing
 from repro.scene import load_scene
 
 #: Seeds: one, one on the upper wall, and two on opposite walls.
@@ -42,7 +44,7 @@ def lines_of(pore):
 def test_parts_have_the_shape_and_the_fields_of_their_triangles(order, seeds):
     """Areas, positions at t = 0, pressures, contact, J and theta, to round-off. Theta is linear in each triangle."""
     _, pore = grown_pore(order, seeds)
-    fine = adhesion.with_finer_lines(pore, SIZE)
+    fine, _ = with_finer_lines(pore, lines_of(pore), SIZE, GRADATION)
     assert len(fine.mesh.cells) > len(pore.mesh.cells) + 40 * len(pore.bodies)
     assert fine.mesh.area() == pytest.approx(pore.mesh.area(), rel=1e-12)
     assert fine.mesh.checked() is fine.mesh
@@ -89,3 +91,44 @@ def test_no_edge_is_longer_than_the_size_around_it_and_no_node_hangs(order, seed
     outer = np.isin(fine.points[edges, 1], ends).all(axis=1) | np.isin(fine.points[edges, 0], fine.ends).all(axis=1)
     assert counts.max() == 2 and (counts[~outer] == 2).all()
     assert fine.quality.min() > 0.3 * pore.mesh.quality.min() and (fine.areas > 0).all()
+
+
+@pytest.mark.parametrize("seeds", SEEDS)
+@pytest.mark.parametrize("order", [1, 2])
+def test_parts_keep_nodes_and_share_amounts(order, seeds):
+    """Values at the nodes of a mesh are among those at the nodes of its parts. Amounts per area that are linear in each
+    triangle are so in its parts, in every aggregate."""
+    _, pore = grown_pore(order, seeds)
+    fine, bisection = with_finer_lines(pore, lines_of(pore), SIZE, GRADATION)
+    field = np.random.default_rng(5).standard_normal(len(pore.mesh.points))
+    assert bisection.restricted(bisection.nodal(field)) == pytest.approx(field, abs=1e-12)
+    table = pore.bodies[0].solid.shape.table
+    corners = 2 + np.random.default_rng(6).random((len(pore.mesh.triangles), 3))
+    constants = corners if order == 2 else corners[:, :1] * np.ones(3)
+
+    def amounts(mesh, owner, local):
+        places = np.einsum("qc,tci->tqi", table.linear, local)
+        at = np.stack([1 - places.sum(axis=2), *np.moveaxis(places, 2, 0)], axis=2)
+        areas = np.abs(np.linalg.det(local[:, 1:] - local[:, :1]))[:, None]
+        every = areas * table.weights * np.einsum("tqc,tc->tq", at, constants[owner])
+        return [every[region.triangles] for region in mesh.regions]
+
+    unit = np.tile(elements.nodes(1), (len(corners), 1, 1))
+    shared = bisection.of_each(amounts(pore.mesh, np.arange(len(corners)), unit), table)
+    expected = amounts(fine.mesh, bisection.owner, bisection.local)
+    for computed, exact in zip(shared, expected, strict=True):
+        limits = exact.min() * 0.6, exact.max() * 1.5
+        assert computed == pytest.approx(exact, rel=0.35) and limits[0] < computed.min() < computed.max() < limits[1]
+        assert computed.sum() == pytest.approx(exact.sum(), rel=1e-12)
+        assert np.median(np.abs(computed / exact - 1)) < 2e-3
+
+
+def test_a_mesh_with_other_triangles_does_not_move_with_the_aggregate(monkeypatch):
+    """Even if the nodes of the boundary and its contact are the same. The numbers of its nodes mean other places."""
+    scene, pore = grown_pore(2, "one")
+    inside, _ = with_finer_lines(pore, np.array([[0.0, 0.4 * pore.boundary.thickness]]), 0.9, 3.0)
+    meshing = Remeshing.of(scene).meshing
+    assert remeshing.same_contact(pore, inside) and len(inside.mesh.triangles) > len(pore.mesh.triangles)
+    assert remeshing.moved_mesh(meshing, pore, pore) is not None
+    monkeypatch.setattr(mesh_motion, "moved", lambda *_: pytest.fail("the mesh moves"))
+    assert remeshing.moved_mesh(meshing, pore, inside) is None

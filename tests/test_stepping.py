@@ -142,7 +142,7 @@ def test_the_guess_of_a_shape_is_exact_where_it_is_known(long_step):
     _, previous, _, half = long_step.within.args
     body = previous.mesh.body
     for part, known in ((0.0, previous.mesh.points), (0.5, half.expansion.position), (1.0, half.end.position)):
-        guess = midpoint._guess_shape(previous, half, part)
+        guess = midpoint._guess_shape(previous, midpoint._known_shapes(half, part))
         assert guess.mesh.points[body] == pytest.approx(known[body], abs=1e-10)
 
 

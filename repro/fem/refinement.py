@@ -8,47 +8,93 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from repro.fem import elements
-from repro.fem.mesh import Mesh, curved
+from repro.fem.elements import Table
+from repro.fem.mesh import Mesh, Region, curved
 from repro.fem.outline import Outline
 from repro.fem.sizing import SPLIT, placed
 from repro.fem.transfer import Located
 
-#: Coordinates nearer to a wall or an end than this times the width lie on it.
+#: Coordinates nearer to a wall or an end than this times the width lie on it; places on a unit
+#: triangle that differ by less are the same.
 ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
-    """A mesh of parts of the triangles of another one.
+class Bisection:
+    """A mesh of parts of the triangles of another one, its parent.
 
-    mesh, outlines: of the parts; owner: (T,) triangle of the other mesh in which each lies; local:
-    (T, 3, 2) places of its corners on the unit triangle of that one.
+    outlines: of the parts; owner: (T,) triangle of the parent in which each part lies; local:
+    (T, 3, 2) corners of each part on the unit triangle of that one. The corners of the parent come
+    first among those of the parts.
     """
 
+    parent: Mesh
     mesh: Mesh
     outlines: list[Outline]
     owner: np.ndarray
     local: np.ndarray
 
-    def nodes_of(self, parts: np.ndarray, owners: np.ndarray) -> Located:
-        """Where the nodes of some parts, ascending, lie in the triangles ``owners`` (ascending
-        numbers) of the other mesh."""
-        cells = self.mesh.cells[parts]
-        _, first = np.unique(cells, return_index=True)
-        local = _within(self.local[parts], elements.nodes(self.mesh.geometry)).reshape(-1, 2)
-        owner = np.repeat(self.owner[parts], cells.shape[1])
-        return Located(np.searchsorted(owners, owner[first]), local[first])
+    def nodal(self, values: np.ndarray) -> np.ndarray:
+        """Values at the nodes of the parts, from those (N, ...) at the parent's nodes."""
+        return self._nodes.field(values, self.parent.cells)
 
-    def points_of(self, parts: np.ndarray, owners: np.ndarray, local: np.ndarray) -> Located:
-        """Where points (q, 2) of the unit triangle of some parts lie in the triangles ``owners``
-        (ascending numbers) of the other mesh, part by part."""
-        owner = np.repeat(self.owner[parts], len(local))
-        return Located(np.searchsorted(owners, owner),
-                       _within(self.local[parts], local).reshape(-1, 2))
+    def at_corners(self, values: np.ndarray) -> np.ndarray:
+        """Values at the corners of the parts, from a field (corners,) that is linear in the
+        aggregates and zero in the fluid."""
+        corners = self.mesh.topology.body_corners
+        at = Located(self._nodes.triangle[corners], self._nodes.local[corners])
+        field = np.zeros(self.mesh.corners)
+        field[corners] = at.field(values, self.parent.triangles)
+        return field
+
+    def restricted(self, values: np.ndarray) -> np.ndarray:
+        """(N, ...) values at the parent's nodes, from those at the nodes of the parts."""
+        where = _within(self.local, elements.nodes(self.mesh.geometry))
+        distance = np.abs(where[:, :, None] - elements.nodes(self.mesh.geometry)).max(axis=3)
+        part, node, place = np.nonzero(distance < ROUND_OFF)
+        at = np.empty(len(self.parent.points), int)
+        at[self.parent.cells[self.owner[part], place]] = self.mesh.cells[part, node]
+        return values[at]
+
+    def of_each(self, amounts: Sequence[np.ndarray], table: Table) -> list[np.ndarray]:
+        """Amounts (t, q) at the points of the parts, aggregate by aggregate, from those in the
+        triangles of the parent.
+
+        The amount per area of the unit triangle is the linear function that fits the values of a
+        triangle best, limited to their range. The parts of a triangle keep its sum.
+        """
+        return [self._split(amount, before, after, table) for amount, before, after
+                in zip(amounts, self.parent.regions, self.mesh.regions, strict=True)]
+
+    def _split(self, amount: np.ndarray, before: Region, after: Region,
+               table: Table) -> np.ndarray:
+        row = np.searchsorted(before.triangles, self.owner[after.triangles])
+        local = self.local[after.triangles]
+        density = amount / table.weights
+        places = elements.values(1, _within(local, table.linear[:, 1:]).reshape(-1, 2))
+        fitted = np.einsum("tqc,tc->tq", places.reshape(*local.shape[:1], -1, 3),
+                           (density @ elements.linear_fit(table).T)[row])
+        limits = density.min(axis=1)[row, None], density.max(axis=1)[row, None]
+        share = elements.determinant(local[:, 1:] - local[:, :1])[:, None]
+        parts = share * table.weights * np.clip(fitted, *limits)
+        totals = np.bincount(row, parts.sum(axis=1))
+        scale = np.divide(amount.sum(axis=1), totals, out=np.ones_like(totals), where=totals > 0)
+        return parts * scale[row, None]
+
+    @cached_property
+    def _nodes(self) -> Located:
+        """Where the nodes of the parts lie in the parent; those of an aggregate lie in it."""
+        cells = self.mesh.cells
+        inside_first = np.argsort(~self.mesh.biomass, kind="stable")
+        _, first = np.unique(cells[inside_first], return_index=True)
+        local = _within(self.local[inside_first], elements.nodes(self.mesh.geometry))
+        owner = np.repeat(self.owner[inside_first], cells.shape[1])
+        return Located(owner[first], local.reshape(-1, 2)[first])
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +110,7 @@ class _Parts:
 
 
 def refined(mesh: Mesh, outlines: Sequence[Outline],
-            size: Callable[[np.ndarray], np.ndarray]) -> Refined:
+            size: Callable[[np.ndarray], np.ndarray]) -> Bisection:
     """Bisect triangles until no edge is longer than ``SPLIT`` times the size around it.
 
     Parameters
@@ -77,7 +123,7 @@ def refined(mesh: Mesh, outlines: Sequence[Outline],
 
     Returns
     -------
-    Refined
+    Bisection
     """
     unit = elements.nodes(1)
     parts = _Parts(mesh.points[: mesh.corners], mesh.triangles, np.arange(len(mesh.triangles)),
@@ -92,7 +138,8 @@ def refined(mesh: Mesh, outlines: Sequence[Outline],
         if mesh.geometry == 2:
             arc, t = np.repeat(arc, 2), _with_middles(t)
         finer.append(placed(outline, arc, t))
-    return Refined(_meshed(mesh, parts, tuple(loops), finer), finer, parts.owner, parts.local)
+    return Bisection(mesh, _meshed(mesh, parts, tuple(loops), finer), finer, parts.owner,
+                     parts.local)
 
 
 def _bisected(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray]) -> _Parts:

@@ -28,7 +28,7 @@ from repro.march.loop import time_before_end
 from repro.march.state import InterpolatedState, StepResult
 from repro.model import biomass, contact_lines, remeshing
 from repro.model.biomass import Rates, grow
-from repro.model.contact_lines import PATIENT, FirstContact, SearchOptions
+from repro.model.contact_lines import LINE_PARTS, PATIENT, FirstContact, SearchOptions
 from repro.model.mechanics import Expansion
 from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh
@@ -126,11 +126,14 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
             search: SearchOptions) -> Expansion:
     """Equilibrium of the aggregate at a part of the step, starting from its known shapes.
 
-    Contact lines continue at their speed.
+    Contact lines start at their interpolated places and have small triangles there.
     """
-    advances = {key: 2 * part * distance for key, distance in half.expansion.advances.items()}
-    guess = _guess_shape(previous, half, part)
-    return stages.expand(previous, after, guess, replace(search, advances=advances))
+    shapes = _known_shapes(half, part)
+    advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
+                for key in half.expansion.advances}
+    search = replace(search, advances=advances,
+                     line_size=stages.remeshing.meshing.sizes.contact / LINE_PARTS)
+    return stages.expand(previous, after, _guess_shape(previous, shapes), search)
 
 
 def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, duration: float,
@@ -249,19 +252,21 @@ def _scale_shape(previous: Pore, after: Pore) -> Pore:
     return _place_bodies(after, points)
 
 
-def _guess_shape(previous: Pore, half: Halfway, part: float) -> Pore:
-    """Initial guess of the shape at a part of the step.
+def _known_shapes(half: Halfway, part: float) -> list[tuple[float, Expansion]]:
+    """Weights of the known shapes of a step at a part of it, besides that of its start: the shape
+    is extrapolated from the first half, or interpolated in start, half way and end if the end is
+    known."""
+    if half.end is None:
+        return [(2 * part, half.expansion)]
+    return [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
 
-    It is extrapolated from the first half, or interpolated in start, half way and end if the end is
-    known.
-    """
-    terms = [(2 * part, half.expansion)]
-    if half.end is not None:
-        terms = [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
+
+def _guess_shape(previous: Pore, shapes: list[tuple[float, Expansion]]) -> Pore:
+    """Initial guess of the shape, from those of :func:`_known_shapes`."""
     corners = previous.mesh.corners
     push = previous.pressure
     points = previous.mesh.points
-    for weight, shape in terms:
+    for weight, shape in shapes:
         push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
         points = points + weight * (shape.position - previous.mesh.points)
     return _place_bodies(replace(previous, pressure=push), points)

@@ -33,18 +33,16 @@ import numpy as np
 from repro.fem import elements
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, edge_functions
-from repro.fem.refinement import refined
 from repro.fem.sizing import GRADATION
-from repro.fem.space import Space
-from repro.fem.transfer import Located
 from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
+from repro.model.finer_lines import with_finer_lines
 from repro.model.flow import Flow
 from repro.model.interface import Interface, interface_of
 from repro.model.mechanics import Mechanics, equilibrium
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
-from repro.model.solid import Solid, material
+from repro.model.solid import Solid
 from repro.model.solving import Solved
 from repro.scene import Flow as Drive
 from repro.scene import Growth, Numerics, Scene, at_time, needed
@@ -180,46 +178,6 @@ def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
     return forces
 
 
-def with_finer_lines(pore: Pore, size: float) -> Pore:
-    """The aggregates in the same shapes, with triangles of a size (um) beside all contact lines.
-
-    Only the mesh changes. The result has neither masses nor substrates.
-    """
-    old = pore.mesh
-    lines = np.concatenate([outline.points[outline.contact_ends] for outline in pore.outlines])
-
-    def size_at(where: np.ndarray) -> np.ndarray:
-        distance = np.linalg.norm(where[:, None] - lines, axis=2).min(axis=1)
-        return size + GRADATION * distance
-
-    fine = refined(old, pore.outlines, size_at)
-    space = Space(fine.mesh)
-    pressure = np.zeros(fine.mesh.corners)
-    none = np.empty((0, 0))
-    bodies = []
-    for body, before, region, outline in zip(pore.bodies, old.regions, fine.mesh.regions,
-                                             fine.outlines):
-        at = fine.nodes_of(region.triangles, before.triangles)
-
-        def carry(positions: np.ndarray, at: Located = at, before: Region = before) -> np.ndarray:
-            return at.field(old.from_region(before, positions), before.cells)
-
-        inside = at.field(pore.pressure, before.cells[:, :3])
-        pressure[region.corner_nodes] = inside[:len(region.corner_nodes)]
-        table = body.solid.shape.table
-        points = fine.points_of(region.triangles, before.triangles, table.linear[:, 1:])
-        fitted = body.theta @ elements.linear_fit(table).T
-        theta = np.sum(elements.values(1, points.local) * fitted[points.triangle], axis=1)
-        theta = np.clip(theta, *(limit(body.theta, axis=1)[points.triangle]
-                                 for limit in (np.min, np.max)))
-        solid = material(space, region, carry(body.reference), body.solid.energy)
-        bodies.append(replace(
-            body, wall=outline.wall, fixed=outline.fixed, active=none, inert=none, solid=solid,
-            theta=theta.reshape(len(region.triangles), -1),
-            configuration=body.configuration.carried(carry)))
-    return replace(pore, space=space, bodies=tuple(bodies), pressure=pressure, concentrations=None)
-
-
 @lru_cache(maxsize=1)
 def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
     """The pore with its aggregates in equilibrium on the mesh of their stresses, and the solution
@@ -230,7 +188,9 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
     if not pore.bodies:
         return pore, solved
     mechanics = Mechanics(loading.growth, loading.numerics)
-    rest = with_finer_lines(pore, LENGTH * pore.mesh.width / ELEMENTS_ALONG)
+    lines = np.concatenate([outline.points[outline.contact_ends] for outline in pore.outlines])
+    size = LENGTH * pore.mesh.width / ELEMENTS_ALONG
+    rest, _ = with_finer_lines(pore, lines, size, GRADATION)
     forces = None
     if loading.growth.has_fluid_forces:
         # The solution's velocity drives this flow. At a jump the scene has only the head after it.

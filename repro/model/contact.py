@@ -12,20 +12,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 
 import numpy as np
 
 from repro.errors import GrowthError, failing_as
 from repro.fem.division import Division
-from repro.model import traction
+from repro.fem.refinement import Bisection
+from repro.model import contact_lines, traction
 from repro.model.closing_by_lines import ByLines
 from repro.model.closing_by_nodes import ByNodes
-from repro.model.contact_lines import PATIENT, SearchOptions
+from repro.model.contact_lines import PATIENT, Advances, SearchOptions
+from repro.model.finer_lines import with_finer_lines
 from repro.model.mechanics import Closing, Expansion, Mechanics
 from repro.model.pore import Pore
 
 #: By the geometry of the triangles.
 CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
+#: Largest number of equilibria with small triangles beside contact lines, where the last one had
+#: these lines.
+PREDICTIONS = 3
+#: Largest distance of a line from its expected place, over the size of the triangles there. At that
+#: distance they are five times as large.
+MISSED = 4
+#: Growth of this size with the distance from a line. Bisection keeps the angles whatever it is.
+LINE_GRADATION = 1.0
 #: Contact lines stay in place after so many rounds of shape and fluid forces, because each search
 #: moves them by up to its tolerance or an edge. Nodes on a wall then stay there, too.
 SETTLING_ROUNDS = 4
@@ -73,8 +84,69 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     forces by a part of the change that gave the shape, up to 0.6 of it after contact. Anderson
     acceleration therefore chooses the forces of a round. After the first contact the film's
     thickness counts under the forces of the open pore, because a closed pore has larger forces.
+
+    With ``search.line_size`` the triangles beside contact lines with the opposite wall are
+    bisected where ``search.advances`` expects the lines. If there is no equilibrium on these
+    triangles, that on the triangles of the mesh takes its place.
     """
     start = guess or grown
+    if search.line_size < inf:
+        try:
+            resolved = _with_small_triangles(mechanics, grown, theta, start, search)
+        except GrowthError:
+            resolved = None
+        if resolved:
+            return resolved
+    return _expand(mechanics, grown, theta, start, search)
+
+
+def _with_small_triangles(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
+                          start: Pore, search: SearchOptions) -> Expansion | None:
+    """:func:`expand` on small triangles beside the contact lines with opposite walls; None if there
+    are no such lines whose advance is expected."""
+    shape = None
+    for _ in range(PREDICTIONS):
+        lines = _lines_after(grown, search.advances)
+        if not len(lines):
+            break
+        fine, fine_theta, bisection = _with_finer_lines(grown, theta, lines, search.line_size)
+        shape = _expand(mechanics, fine, fine_theta, divided_start(start, fine, bisection), search)
+        shape = replace(shape, bisection=bisection)
+        missed = [abs(length - search.advances[key]) for key, length in shape.advances.items()]
+        if max(missed) <= MISSED * search.line_size:
+            break
+        search = replace(search, advances=shape.advances)
+    return shape
+
+
+def _lines_after(grown: Pore, advances: Advances) -> np.ndarray:
+    """(K, 2) um, points of the grown outlines at contact lines with opposite walls that have
+    advanced; none where no line has."""
+    lines = [(outline, line, advances[number, *line.key])
+             for number, outline in enumerate(grown.outlines)
+             for line in contact_lines.lines_of(outline)
+             if line.wall != outline.seat.wall and (number, *line.key) in advances]
+    return np.array([contact_lines.point_at(*each) for each in lines])
+
+
+def _with_finer_lines(grown: Pore, theta: Sequence[np.ndarray], lines: np.ndarray,
+                      size: float) -> tuple[Pore, list[np.ndarray], Bisection]:
+    """A grown pore and its theta on triangles of a size (um) beside points (K, 2) um."""
+    fine, bisection = with_finer_lines(grown, lines, size, LINE_GRADATION)
+    table = grown.space.table
+    active, inert, expanded = [
+        bisection.of_each(amounts, table) for amounts in (
+            [body.active for body in grown.bodies], [body.inert for body in grown.bodies],
+            [each * body.solid.at.dx for body, each in zip(grown.bodies, theta)])]
+    bodies = tuple(replace(body, active=first, inert=second)
+                   for body, first, second in zip(fine.bodies, active, inert))
+    theta = [amount / body.solid.at.dx for body, amount in zip(bodies, expanded)]
+    return replace(fine, bodies=bodies), theta, bisection
+
+
+def _expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], start: Pore,
+            search: SearchOptions) -> Expansion:
+    """:func:`expand` on the mesh of a grown pore."""
     if mechanics.fluid is None or not grown.bodies:
         return shape_under(mechanics, grown, theta, start, None, search)
     water = traction.SurroundingFlow(mechanics.fluid, grown)
@@ -170,7 +242,7 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
     return replace(shape, pore=shape.pore.focused(None))
 
 
-def divided_start(start: Pore, shape: Pore, division: Division) -> Pore:
-    """The pore from which further searches start, on the mesh of a shape that divides an arc."""
+def divided_start(start: Pore, shape: Pore, division: Division | Bisection) -> Pore:
+    """The pore from which further searches start, on the mesh of a shape with divided triangles."""
     divided = shape.moved(division.nodal(start.mesh.points))
     return replace(divided, pressure=division.at_corners(start.pressure))

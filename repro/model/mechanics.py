@@ -15,6 +15,7 @@ import numpy as np
 
 from repro.fem.division import Division
 from repro.fem.outline import Outline
+from repro.fem.refinement import Bisection
 from repro.fem.walls import FREE
 from repro.model import growth
 from repro.model.contact_lines import Advances, SearchOptions
@@ -55,9 +56,10 @@ class Expansion:
     pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
     within an arc; iterations: of Newton's method; gaps: um, of the aggregate with the thinnest film
     at a wall that it does not touch, this film in the old and in the new shape before films close;
-    divisions: of the mesh of the grown pore, one after the other, for
-    each aggregate with lines within arcs; advances: {(number, wall, direction): um} by which
-    contact lines of an aggregate, by its place in the list, have advanced along its grown outline.
+    divisions: one after the other, for each aggregate with lines within arcs; advances: {(number,
+    wall, direction): um} by which contact lines of an aggregate, by its place in the list, have
+    advanced along its grown outline; bisection: of the grown pore's mesh before it was divided,
+    None if its triangles were small enough.
     """
 
     pore: Pore
@@ -65,6 +67,7 @@ class Expansion:
     gaps: tuple[float, float] = (inf, inf)
     divisions: tuple[Division, ...] = ()
     advances: Advances = field(default_factory=dict)
+    bisection: Bisection | None = None
 
     @property
     def position(self) -> np.ndarray:
@@ -72,7 +75,7 @@ class Expansion:
         points = self.pore.mesh.points
         for division in self.divisions[::-1]:
             points = division.restricted(points)
-        return points
+        return self.bisection.restricted(points) if self.bisection else points
 
     def joined(self, other: Expansion) -> Expansion:
         """This expansion and then that of another aggregate in its pore."""
@@ -84,13 +87,15 @@ class Expansion:
         """Carry amounts (r, q) from the points of the grown pore's aggregates to those of the new
         shapes."""
         parts = [grown.of(region, amounts) for region in grown.mesh.regions]
+        if self.bisection:
+            parts = self.bisection.of_each(parts, grown.space.table)
         for division in self.divisions:
             parts[division.number] = division.amounts(parts[division.number], grown.space.table)
         return self.pore.joined(parts)
 
     def gathered(self, loads: np.ndarray) -> np.ndarray:
-        """(n, 2) loads on the nodes of the grown aggregates, from those on the new shapes' nodes.
-        """
+        """(n, 2) loads on the nodes of the grown aggregates, from those on the new shapes' nodes,
+        without a bisection."""
         mesh = self.pore.mesh
         nodal = mesh.from_body(loads)
         for division in self.divisions[::-1]:

@@ -140,7 +140,7 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
     """The mesh, moved with the aggregates; None if a new mesh is needed."""
     mesh = previous.mesh
     length = meshing.channel.length
-    if not same_contact(expanded, previous):
+    if expanded.mesh.topology is not mesh.topology or not same_contact(expanded, previous):
         return None
     for outline, sizes in sizing.each_beside(expanded.outlines, meshing.sizes):
         if (sizing.extent_too_short(outline, mesh.ends, mesh.whole_width, length)

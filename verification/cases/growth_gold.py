@@ -107,7 +107,7 @@ def judge(kind: str, preset: str, record) -> None:
 @pytest.mark.slow
 @pytest.mark.case(
     "growth-gold-contact", kind="cross-code", references=("gold_growth",),
-    mutants=("half-angle",),
+    mutants=("half-angle", "lines-on-the-arcs-ahead"),
     omitted="1, paper: nodes join the wall one by one, see growth-contact-lines")
 @parametrize("preset", PRESETS)
 def test_contact(preset, record):

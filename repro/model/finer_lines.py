@@ -1,0 +1,47 @@
+"""Smaller triangles beside contact lines, in which an aggregate keeps its shape and its fields."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from repro.fem.refinement import Bisection, refined
+from repro.fem.space import Space
+from repro.model.pore import Pore
+from repro.model.solid import material
+
+
+def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
+                     gradation: float) -> tuple[Pore, Bisection]:
+    """The aggregates in the same shapes, with triangles of a size (um) beside points (K, 2) um.
+
+    The size grows by ``gradation`` times the distance from the points. Only the mesh changes, by
+    bisection. The result has neither masses nor substrates.
+    """
+    def size_at(where: np.ndarray) -> np.ndarray:
+        return size + gradation * np.linalg.norm(where[:, None] - lines, axis=2).min(axis=1)
+
+    bisection = refined(pore.mesh, pore.outlines, size_at)
+    space = Space(bisection.mesh)
+    origin = bisection.nodal(pore.origin)
+    expanded = bisection.of_each([body.theta * body.solid.at.dx for body in pore.bodies],
+                                 pore.bodies[0].solid.shape.table)
+    none = np.empty((0, 0))
+    bodies = []
+    for number, (body, region, outline) in enumerate(zip(pore.bodies, bisection.mesh.regions,
+                                                         bisection.outlines)):
+        seen = pore.focused(number)
+
+        def carry(positions: np.ndarray, seen: Pore = seen, nodes: np.ndarray = region.nodes,
+                  ) -> np.ndarray:
+            return bisection.nodal(seen.mesh.from_region(seen.region, positions))[nodes]
+
+        solid = material(space, region, origin[region.nodes], body.solid.energy)
+        bodies.append(replace(body, wall=outline.wall, fixed=outline.fixed, active=none,
+                              inert=none, solid=solid,
+                              theta=expanded[number] / solid.at.dx,
+                              configuration=body.configuration.carried(carry)))
+    fine = replace(pore, space=space, bodies=tuple(bodies), concentrations=None,
+                   pressure=bisection.at_corners(pore.pressure))
+    return fine, bisection
