@@ -199,11 +199,11 @@ def mutant_state() -> str:
 
 
 def mutant_blocks(stages: Mapping[str, Iterable[Mutant]], state: str) -> list[str]:
-    """A table a stage: mutants, and the cases or tests that caught them when they were last run."""
+    """A table a stage: mutants, and the cases or tests (of ``tests/``) that caught them when they were last run."""
     records = runner.recorded()
     blocks = [state]
     for stage, chosen in stages.items():
-        rows = [(mutant.id, mutant.says, ", ".join(records[mutant.id]["caught_by"]) or "not caught")
+        rows = [(mutant.id, mutant.says, ", ".join(each.removeprefix("tests/") for each in records[mutant.id]["caught_by"]) or "not caught")
                 for mutant in chosen]
         blocks += [f"## {stage}", table(("mutant", "what is wrong with it", "caught by"), rows)]
     return blocks
