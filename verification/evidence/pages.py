@@ -203,7 +203,7 @@ def mutant_state() -> str:
 def mutant_blocks(stages: Mapping[str, Iterable[Mutant]], state: str) -> list[str]:
     """A table a stage: mutants, and the cases or tests that caught them when they were last run.
 
-    tests/test_FILE.py::test_NAME is written as FILE: NAME, so that the page stays short.
+    A test is written as its file and its name without "test", so that the page stays short.
     """
     records = runner.recorded()
     blocks = [state]
