@@ -1,8 +1,10 @@
 # `make` without a target lists the targets. Everything runs in .venv; if it is missing, it is created from requirements.lock.
+# Targets that compare with other codes add the packages of verification/requirements.lock to it.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
+ALL := $(VENV)/.verification
 CRATE := build/crate/.installed
 SITE := build/docs/.installed
 OLDEST := build/oldest/.installed
@@ -25,7 +27,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
 
-env: $(STAMP) ## create .venv from requirements.lock and install this package in it (PYTHON=python3.12 ...)
+env: $(STAMP) ## create .venv (0.5 GB) and install this package, figures and pytest in it (PYTHON=python3.12 ...)
 
 figures: $(STAMP) ## run the paper's simulations and draw its figures into paper_figures/out
 	@$(BIN) -m paper_figures
@@ -43,34 +45,34 @@ sensitivity: $(STAMP) ## effects of the rounding of Table 1: elasticities, one s
 validation: $(STAMP) ## compare the model with measurements, and write the tables of docs/validation.md
 	@$(BIN) -m verification.validation
 
-verify: $(STAMP) ## run the verification cases against independent references, and write their pages
+verify: $(ALL) ## run the verification cases against independent references, and write their pages
 	@$(BIN) -m pytest verification -n logical --dist worksteal --pages $(SLOW)
 
-verify-fast: $(STAMP) ## run the quick verification cases, which are part of make test
+verify-fast: $(ALL) ## run the quick verification cases, which are part of make test
 	@$(BIN) -m pytest verification -n logical --dist worksteal -m "not slow"
 
-mutants: $(STAMP) ## check that the cases and tests detect every registered wrong change of the code
+mutants: $(ALL) ## check that the cases and tests detect every registered wrong change of the code
 	@$(BIN) -m verification.mutants
 
-mutants-sampled: $(STAMP) ## run a sample of machine-made mutants of repro/ against the tests; continues an interrupted session
+mutants-sampled: $(ALL) ## run a sample of machine-made mutants of repro/ against the tests; continues an interrupted session
 	@$(PIP) --require-hashes --no-deps --only-binary :all: -r verification/mutants/machine/requirements.lock
 	@$(BIN) -m verification.mutants.machine
 
-test: $(STAMP) ## run the tests and the quick verification cases on all cores
+test: $(ALL) ## run the tests and the quick verification cases on all cores
 	@$(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
 
-test-thorough: $(STAMP) ## the same with more random examples, and the slow tests
+test-thorough: $(ALL) ## the same with more random examples, and the slow tests
 	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow" $(SLOW)
 
 oldest: $(OLDEST) ## run quick tests with the oldest accepted versions of the dependencies
 	@$(dir $(OLDEST))bin/python -m pytest $(OLDEST_TESTS)
 
-lint: $(STAMP) ## check style and types with ruff and mypy
+lint: $(ALL) ## check style and types with ruff and mypy
 	@$(BIN) -m ruff check .
 	@$(BIN) -m ruff check --select E501 --config line-length=100 repro
 	@$(BIN) -m mypy
 
-bench: $(STAMP) ## measure time against error, cost against size, and cost and effect of each assumption
+bench: $(ALL) ## measure time against error, cost against size, and cost and effect of each assumption
 	@$(BIN) -m verification.bench
 	@$(BIN) -m verification.throughput
 	@$(BIN) -m verification.audit
@@ -90,7 +92,7 @@ gold: $(GOLD) ## compute the numbers of another code, NGSolve, anew: reference/g
 	@$(dir $(GOLD))bin/python -m reference.gold.pair
 	@$(dir $(GOLD))bin/python reference/gold/growth.py
 
-docs: $(STAMP) $(SITE) ## build the site into docs/_build/html, without network
+docs: $(ALL) $(SITE) ## build the site into docs/_build/html, without network
 	@$(dir $(SITE))bin/python -m sphinx -q -W --keep-going -b html -c docs . docs/_build/html
 	@echo "docs/_build/html/index.html"
 
@@ -108,6 +110,11 @@ $(STAMP): requirements.lock pyproject.toml
 	@"$(PYTHON)" -m venv --clear $(VENV)
 	@$(PIP) --require-hashes --only-binary :all: -r requirements.lock
 	@$(PIP) --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(ALL): verification/requirements.lock $(STAMP)
+	@echo "Adding the packages of verification/requirements.lock to $(VENV); this takes a minute or two."
+	@$(PIP) --require-hashes --no-deps --only-binary :all: -r verification/requirements.lock
 	@touch $@
 
 # The validator of `make crate`, and NGSolve of `make gold`, have separate environments.

@@ -27,7 +27,9 @@ RUNTIME = PROJECT["project"]["dependencies"]
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 LOCKS = [(ROOT / name).read_text(encoding="utf-8")
          for name in ("requirements.lock", "verification/mutants/machine/requirements.lock", ".ci/crate.lock",
-                      ".ci/oldest.lock", ".ci/network.lock", ".ci/gold.lock")]
+                      ".ci/oldest.lock", ".ci/network.lock", ".ci/gold.lock", "verification/requirements.lock")]
+#: Extras that `make env` installs, and those that `make test` and `make verify` add.
+SMALL, ADDED = ("figures", "test", "netcdf", "env"), ("verification", "dask", "lint")
 #: {module: distribution} of packages that only a lock of their own installs.
 ELSEWHERE = {"netgen": ["netgen-mesher"]}
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)", re.M)
@@ -155,21 +157,29 @@ def test_every_import_is_declared(folder):
     assert names and used <= {*map(normal, RUNTIME + extras)}
 
 
-@pytest.mark.parametrize("lock", LOCKS, ids=["all", "mutants", "crate", "oldest", "network", "gold"])
+@pytest.mark.parametrize("lock", LOCKS, ids=["env", "mutants", "crate", "oldest", "network", "gold", "added"])
 def test_the_lock_holds_hashes_and_no_address(lock):
     """Pip itself checks that every line is a pin with its hashes."""
     assert 0 < len(PIN.findall(lock)) <= lock.count("--hash=sha256:") and not ADDRESS.search(lock)
 
 
 @pytest.mark.parametrize("lock, requirements", [
-    (LOCKS[0], RUNTIME + PROJECT["build-system"]["requires"]
-     + [r for name in {*EXTRAS} - {"fast", "mutation", "gold"} for r in EXTRAS[name]]),
-    (LOCKS[1], EXTRAS["mutation"]), (LOCKS[5], EXTRAS["gold"])], ids=["all", "mutants", "gold"])
+    (LOCKS[0], RUNTIME + PROJECT["build-system"]["requires"] + [r for name in SMALL for r in EXTRAS[name]]),
+    (LOCKS[1], EXTRAS["mutation"]), (LOCKS[5], EXTRAS["gold"]),
+    (LOCKS[6], [r for name in ADDED for r in EXTRAS[name]])],
+    ids=["env", "mutants", "gold", "added"])
 def test_the_lock_pins_every_direct_dependency_within_its_bounds(lock, requirements):
     """The machine-made mutants and NGSolve have locks of their own; no lock has the optional packages for speed."""
     for requirement in requirements:
         pins = [version(pinned) for name, pinned in PIN.findall(lock) if name == normal(requirement)]
         assert pins and min(pins) >= version(re.search(r">=([\d.]+)$", requirement)[1]), requirement
+
+
+def test_make_env_leaves_out_what_only_verification_needs():
+    """No package is in both locks, every extra but three is in one of them, and the largest packages are added."""
+    small, added = ({name for name, _ in PIN.findall(lock)} for lock in (LOCKS[0], LOCKS[6]))
+    assert not small & added and {*EXTRAS} == {*SMALL, *ADDED, "fast", "mutation", "gold"}
+    assert {"vtk", "llvmlite", "sympy", "mypy", "sphinx"} <= added and {"matplotlib", "pytest", "xarray"} <= small
 
 
 def test_the_lower_bounds_are_the_oldest_versions_tested():

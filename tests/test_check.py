@@ -386,6 +386,18 @@ def test_the_modelled_physics_follow_the_sections():
     assert gear["aggregate"].startswith("biomass inside a spline through 3 points")
 
 
+def test_check_describes_what_leaves_and_when_a_run_ends_early():
+    """Nothing of it is said of a scene without it."""
+    leaving = ["growth.bonding_strength=1e-3 MPa", "growth.after_detachment=continue", "growth.until=steady"]
+    words = dict(describe_model(load_scene("base", leaving)))["growth"]
+    assert "; an aggregate that detaches leaves the pore, and the run goes on; it ends early if the aggregates are " \
+        "steady; strain" in words and "erode" not in words
+    eroding = [FAST, "growth.new_biomass=stress_free", 'growth.erosion.speed="0.1 um/h"']
+    assert "free surfaces erode, by the law constant; new" in describe_model(load_scene("base", eroding))[5][1]
+    plain = dict(describe_model(load_scene("base")))["growth"]
+    assert not any(word in plain for word in ("leaves", "early", "erode"))
+
+
 def test_check_describes_values_over_time():
     """The text keeps the order of the substrates and has the range of values and the last time."""
     steps = [["0 h", "3 mg/L"], ["1 h", "9 mg/L"], ["4 h", "5 mg/L"]]

@@ -106,9 +106,10 @@ def test_a_bare_command_prints_its_help(capsys):
 
 @pytest.mark.parametrize("page", PAGES)
 def test_printed_pages_have_no_links_to_files(page, capsys):
-    """A terminal cannot follow them. Each names a file of the repository that exists."""
+    """A terminal cannot follow them. Each names a file of the repository that exists. Formulas have no signs of TeX."""
     assert main(["docs", page]) == 0
     text = capsys.readouterr().out
+    assert not re.search(r"[$\\]", text) and (page != "scope" or "the modulus mu_L theta^{-2/3}" in text)
     assert not re.search(r"\]\((?!https?:)", text)
     files = re.findall(r"\(docs/([^)#]+)\S* in the repository\)", text)
     assert all((Path("docs") / name).exists() for name in files) and (files or page != "scope")

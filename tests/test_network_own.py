@@ -1,4 +1,5 @@
 """The laws for networks with a scene's own kinetics: its rates, supplies, file and shapes, and what is refused."""
+import dataclasses
 import json
 
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 
 import repro
 from repro.cli import main
+from repro.model.meshing import seeded
 from repro.network import own, resistance, uptakes
 from repro.results.files import sealed
 from verification.network import own as record
@@ -168,10 +170,43 @@ def test_the_table_holds_for_its_states(table):
     assert (widths > 30).all() and (widths < 120).all() and (supplies < [8, 6]).all()
 
 
-@pytest.mark.thorough
-def test_the_run_of_a_scene_gives_shapes(monkeypatch):
+def test_a_state_is_a_solution_of_its_scene(table):
+    """Its half-disc as a scene of its own, in a pore of 15 W: the uptakes of the row at t = 0 (pg/m/h)."""
+    area, width, velocity, acceptor, donor, *taken = table.states[0]
+    state = {**SCENE, "pore": {"width": f"{width} um", "length": f"{15 * width} um"},
+             "aggregate": {"radius": f"{np.sqrt(2 * area / np.pi)} um"}, "flow": {"mean_velocity": f"{velocity} m/d"},
+             "substrates": {"acceptor": {"supply": f"{acceptor} mg/L"},
+                            "donor": {"supply": f"{donor} mg/L", "half_saturation": "0.5 mg/L"}}}
+    run = repro.solve(state)
+    assert taken == pytest.approx([1e6 * run[f"{name}_uptake_ug_per_m_per_h"][0] for name in ("acceptor", "donor")],
+                                  rel=1e-3)
+    assert taken[0] != pytest.approx(taken[1], rel=0.05)
+
+
+def test_a_fit_recovers_the_constants_of_the_law(table):
+    """To three digits, from those of Table 1 on, and from uptakes that other constants make."""
+    scene, random = repro.load_scene(SCENE), np.random.default_rng(3)
+    states = np.column_stack([random.uniform(10, 3000, 40), np.full(40, 60.0), np.exp(random.uniform(-6, 2, 40)),
+                              random.uniform(0.5, 8, 40), random.uniform(0.5, 6, 40)])
+    aggregates = own.throats(own._law(scene, table), states)
+    other = uptakes.Transport(6.1, 0.42, 0.8, 0.45)
+    solutions = dataclasses.replace(aggregates, law=aggregates.law._replace(transports=(other, other))).uptake()[:2]
+    assert own.fit(aggregates, solutions, uptakes.TRANSPORTS[0]) == pytest.approx(other, rel=5e-3)
+
+
+def test_the_length_of_a_half_disc_is_that_of_the_table():
+    """r of a half-disc in a pore of 15 W, against the law of its area."""
+    pore = seeded(repro.load_scene({**SCENE, "pore": {"width": "60 um", "length": "900 um"},
+                                    "aggregate": {"radius": "30 um"}}))
+    share = pore.boundary.area / 3600
+    assert own.added_length(pore.space, LAMBDA) == pytest.approx(
+        repro.added_resistance(share, 1.0).length, rel=0.05)
+
+
+def test_the_run_of_a_scene_gives_shapes():
     """They are apart in area, and the law with them has their own r."""
-    scene = repro.load_scene({**SCENE, "aggregate": {"radius": "12 um"}, "growth": {"end": "20 h"}})
+    scene = repro.load_scene({**SCENE, "aggregate": {"radius": "12 um"}, "growth": {"end": "10 h"},
+                              "numerics": {"preset": "fast"}})
     pores = list(own._grown(scene, lambda time, end: None))
     shares = np.array([pore.boundary.area for pore in pores]) / 3600
     assert len(shares) >= 3 and (shares[1:] > own.APART * shares[:-1]).all()

@@ -97,6 +97,24 @@ def test_a_key_of_one_body_changes_this_body_alone(key, number):
     assert load_scene(scene, unset=[f"aggregate.{key}.position"]).aggregates[number].position == 0.0
 
 
+THREE = {"pore": {"width": "50 um"}, "flow": {"mean_velocity": "1 m/d"},
+         "aggregate": [{"radius": "4 um"}, {"radius": "5 um", "position": "40 um"},
+                       {"radius": "6 um", "position": "90 um"}]}
+
+
+@pytest.mark.parametrize("unset, radii", [
+    (["aggregate.1", "aggregate.2"], [6.0]), (["aggregate.2", "aggregate.1"], [6.0]),
+    (["aggregate.2.position", "aggregate.2"], [4.0, 6.0]), (["aggregate.3", "aggregate.1", "aggregate.2"], []),
+    (["aggregate.1", "aggregate.3.position"], [5.0, 6.0])])
+def test_aggregates_that_are_left_out_do_not_renumber_the_others(unset, radii):
+    """Numbers are those of the scene, in every order. --set comes later: it sees those that are left."""
+    apart = [f"aggregate.{len(radii)}.position=-90 um"] if unset[-1].endswith("position") else []
+    assert [seed.radius for seed in load_scene(THREE, apart, unset=unset).aggregates] == radii
+    for again in ("aggregate.2", "aggregate.2.position"):
+        with pytest.raises(repro.SceneError, match=f'unset "{again}": the scene does not set it'):
+            load_scene(THREE, unset=["aggregate.2", again])
+
+
 REFUSED = {
     "aggregate.radius=3 um": "the scene has 2 aggregates, aggregate.left, aggregate.2; one of them is needed, such as "
                              "aggregate.left.radius",

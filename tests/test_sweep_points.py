@@ -168,3 +168,18 @@ def test_the_time_left_is_that_of_the_missing_runs(tmp_path, monkeypatch, capsys
     assert [event["left_s"] for event in events[1:]] == [20, 20, 0]
     _print_run(events[1])
     assert "failed: x; about 20 s left" in capsys.readouterr().err
+
+
+def test_a_sample_of_salib_is_a_table_of_points(tmp_path, capsys):
+    """With its own bounds, as a dict of columns and as a CSV file: every row of Saltelli's design is a run."""
+    sobol = pytest.importorskip("SALib.sample.sobol")
+    problem = {"num_vars": 2, "names": ["pore.width (um)", "flow.mean_velocity (m/day)"],
+               "bounds": [[40.0, 60.0], [1.0, 3.0]]}
+    sample = sobol.sample(problem, 4, calc_second_order=False, seed=1)
+    factors, combinations = read(dict(zip(problem["names"], sample.T)), [], None)
+    assert len(combinations) == 4 * (2 + 2) and np.array(combinations) == pytest.approx(sample)
+    path = tmp_path / "points.csv"
+    np.savetxt(path, sample, delimiter=",", header=",".join(problem["names"]), comments="")
+    assert read(path, [], None) == (factors, combinations)
+    assert main(["sweep", "flow_only", "--points", str(path), "--dry-run"]) == 0
+    assert capsys.readouterr().out.startswith("flow_only: 16 points; ")

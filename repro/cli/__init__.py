@@ -12,14 +12,14 @@ import shlex
 import sys
 from contextlib import suppress
 
-from repro.cli import check, compare, docs, network, plot, run, scene, sweep
+from repro.cli import check, compare, docs, network, permeability, plot, run, scene, sweep
 from repro.errors import Interrupted, OutputError, Refusal, SimulationError, printable
 from repro.runs.progress import in_json, say
 from repro.scene import SceneError
 
 #: The modules of the commands. Each has ``add(commands)``, which adds its parser with
 #: ``set_defaults(call=...)``; ``call`` takes the parsed arguments and returns the exit status.
-COMMANDS = (run, scene, check, plot, compare, sweep, network, docs)
+COMMANDS = (run, scene, check, plot, compare, sweep, permeability, network, docs)
 
 
 def main(arguments: list[str] | None = None) -> int:

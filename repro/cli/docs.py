@@ -32,11 +32,13 @@ def call(options) -> int:
             say(f"{name:14}{subject}")
     else:
         page = files("repro") / "pages" / f"{options.page}.md"
-        say(_without_links(page.read_text(encoding="utf-8").removesuffix("\n")))
+        say(_as_text(page.read_text(encoding="utf-8").removesuffix("\n")))
     return 0
 
 
-def _without_links(text: str) -> str:
-    """The text with the file of the repository in place of each link to a file, which a terminal
-    cannot follow."""
-    return re.sub(r"\[([^]]+)\]\((?!https?:)([^)]+)\)", r"\1 (docs/\2 in the repository)", text)
+def _as_text(markdown: str) -> str:
+    """The text for a terminal: files of the repository in place of links to them, and formulas
+    without TeX's signs."""
+    text = re.sub(r"\[([^]]+)\]\((?!https?:)([^)]+)\)", r"\1 (docs/\2 in the repository)",
+                  markdown)
+    return re.sub(r"\$|\\(?:quad)?", "", text)

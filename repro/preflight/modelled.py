@@ -143,6 +143,12 @@ def _growth(scene: Scene) -> Iterator[str]:
     for key in ("bonding_strength", "tensile_strength"):
         if getattr(growth, key) is not None:
             yield f"{key.replace('_', ' ')} {scene_tables(scene)['growth'][key]}"
+    if growth.continues:
+        yield "an aggregate that detaches leaves the pore, and the run goes on"
+    if growth.erosion:
+        yield f"free surfaces erode, by the law {growth.erosion.law}"
+    if growth.until_steady:
+        yield "it ends early if the aggregates are steady"
     yield {"stressed": "strain since t = 0",
            "stress_free": "new biomass without stress (section 5)"}[growth.new_biomass]
 

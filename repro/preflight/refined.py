@@ -206,24 +206,21 @@ def _describe(scene: Scene) -> str:
     return f"{numerics.preset} (refinement {numerics.refinement:.3g}{step})"
 
 
-def _with_rows(scene: Scene) -> Scene:
-    """Return the scene with rows at its requested times, or at evenly spaced ones."""
-    if scene.growth is None:
-        return scene
-    end = scene.growth.end
-    times = scene.output.requested(end) or np.linspace(0.0, end, INTERVALS + 1).tolist()
-    return replace(scene, output=replace(scene.output, times=tuple(times), every=None))
-
-
 class _Run:
-    """A run, step by step. time: h, that it has reached; rows: columns by time (h)."""
+    """A run, step by step, with rows at the scene's requested times, or at evenly spaced ones.
+
+    time: h, that it has reached; rows: columns by time (h).
+    """
 
     def __init__(self, name: str, scene: Scene):
         self.name = name
         self.time = -1.0
         self.rows: dict[float, dict[str, float | None]] = {}
         self.stopped: str | None = None
-        self._steps = self._advance(_with_rows(scene))
+        if scene.growth:
+            even = np.linspace(0.0, scene.growth.end, INTERVALS + 1).tolist()
+            scene = scene.reporting(*(scene.requested_times or even))
+        self._steps = self._advance(scene)
 
     def _advance(self, scene: Scene) -> Iterator[None]:
         for state, row in steps(scene):

@@ -5,6 +5,7 @@
     arrays        quantities of the fields
     names         words and units of all quantities, by name
     tables        results in Python
+    permeability  laws for models on the Darcy scale
     drawing       curves, fields and films with matplotlib
     netcdf        results as NetCDF, by `Results.to_netcdf`
 

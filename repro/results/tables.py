@@ -8,7 +8,7 @@ from functools import lru_cache
 from html import escape
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from repro.scene.arguments import Overrides, typed
 from repro.scene.units import to_internal
 from repro.schemes import Scheme
 from repro.timing import progress_bar
+
+if TYPE_CHECKING:
+    from repro.results.permeability import Permeability
 
 #: The name of the picture of all outlines.
 OUTLINES = "outlines"
@@ -531,6 +534,36 @@ class Results(Mapping[str, np.ndarray]):
         fields = self._fields[-1] if len(self.time) else {}
         style = Style(log, unit, title, cmap)
         return drawing.film(self, self._field(name, fields), Path(file), ax, style)
+
+    def permeability(self) -> Permeability:
+        """Fit the usual laws for models on the Darcy scale to K / K0 of the rows.
+
+        K0 is the conductivity of the clean pore, and the biomass per pore volume is the area of the
+        aggregates over that of the pore.
+
+        Returns
+        -------
+        repro.results.permeability.Permeability
+            ``columns`` by name and ``fits`` by law; ``to_csv`` writes the columns, and ``print``
+            shows the constants with their errors.
+
+        Raises
+        ------
+        KeyError
+            If the scene has no flow or no aggregate.
+        ValueError
+            If the rows have less than three amounts of biomass.
+
+        Examples
+        --------
+        >>> import repro
+        >>> permeability = repro.solve("base", {"growth.end": "1 h"}).permeability()
+        >>> permeability.columns["relative_permeability"][0].round(3).item()
+        0.989
+        """
+        from repro.results.permeability import of_runs  # runs do not load it
+
+        return of_runs([self])
 
     def to_pandas(self):
         """Return the columns as a ``pandas.DataFrame``.

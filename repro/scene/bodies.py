@@ -82,6 +82,16 @@ def single(tables: dict) -> dict:
     return {**tables, SECTION: listed[0] if len(listed) == 1 else listed}
 
 
+def remaining(tables: dict) -> dict:
+    """The tables without the aggregates that were left out, which are None."""
+    listed = as_list(tables.get(SECTION))
+    if listed is None or None not in listed:
+        return tables
+    kept = [body for body in listed if body is not None]
+    without = {name: part for name, part in tables.items() if name != SECTION}
+    return {**without, SECTION: kept} if kept else without
+
+
 def _names(bodies: object) -> list[object]:
     listed = bodies if isinstance(bodies, list) else [bodies]
     return [body.get("name") if isinstance(body, dict) else None for body in listed]

@@ -130,17 +130,23 @@ def key_of(entry: str) -> str:
 
 
 def leave_out(tables: dict, key: str, file: str, known: tuple[str, ...]) -> None:
-    """Remove a dotted key or a section from the tables. Raises SceneError if it is absent."""
+    """Remove a dotted key or a section from the tables. Raises SceneError if it is absent.
+
+    One of several aggregates becomes None, so that the others keep their numbers.
+    """
     bodies.refuse_unaddressed(tables, key_of(key), f"{file}: --unset {quote(key)}")
     *above, last = bodies.path_of(tables, key_of(key))
     table: Any = tables
     for part in above:
         table = table[part] if isinstance(part, int) else \
             table.get(part) if isinstance(table, dict) else None
-    if not (isinstance(last, int) or isinstance(table, dict) and last in table):
+    if not (table[last] if isinstance(last, int) else isinstance(table, dict) and last in table):
         hint = did_you_mean("" if key_of(key) in known else elsewhere(key_of(key)[:60], known))
         raise SceneError(f"{file}: --unset {quote(key)}: the scene does not set it{hint}")
-    del table[last]
+    if isinstance(last, int):
+        table[last] = None
+    else:
+        del table[last]
 
 
 def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> None:

@@ -650,9 +650,9 @@ class Scene:
         """The times (h) of rows by [output], ascending; None: every step."""
         return self.output.requested(self.growth.end if self.growth else 0.0)
 
-    def reporting(self, time: float) -> "Scene":
-        """Return the scene with a row at a time (h) alone."""
-        return replace(self, output=replace(self.output, every=None, times=(time,)))
+    def reporting(self, *times: float) -> "Scene":
+        """Return the scene with rows at these times (h) alone."""
+        return replace(self, output=replace(self.output, every=None, times=times))
 
     def corner(self, time: float) -> float:
         """Return the next time (h) of its tables after ``time``; infinite if there is none."""
@@ -765,6 +765,7 @@ def load_tables(source: Source, overrides: Collection[str] = (), unset: Sequence
     tables = bodies.single(tables)
     for key in unset:
         leave_out(tables, key, file, KEYS)
+    tables = bodies.remaining(tables) if unset else tables
     for entry in overrides:
         override(tables, entry, file, KEYS)
     return bodies.single(tables)

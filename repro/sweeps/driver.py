@@ -9,18 +9,22 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from repro.results import drawing
 from repro.results.quantities import unit_of
 from repro.results.tables import package
 from repro.runs.folder import folder_errors
 from repro.runs.machine import refuse_exchanged, require_packages
+from repro.runs.scripts import load_run
 from repro.scene import SceneError, Source, label
 from repro.scene.arguments import Overrides, typed
 from repro.sweeps import cluster, design, own_points, page, pool, table
 from repro.sweeps.folder import Sweep, SweepError, lock_folder
 from repro.timing import progress_bar
+
+if TYPE_CHECKING:
+    from repro.results.permeability import Permeability
 
 #: The part of the first conductivity at which a pore counts as clogged.
 CLOGGED = 0.1
@@ -106,6 +110,12 @@ class Swept:
         variables = {name: (dims, column.to_numpy().reshape(shape), {"units": unit_of(name).symbol})
                      for name, column in frame.items()}
         return package("xarray").Dataset(variables, coordinates, {"scene": self.source})
+
+    def permeability(self) -> Permeability:
+        """Fit the laws of :meth:`repro.Results.permeability` to the rows of all runs."""
+        from repro.results.permeability import of_runs
+
+        return of_runs([load_run(path) for path in self.paths])
 
     def plot(self, name: str = "conductivity_m_per_d", *, ax: Any = None) -> Any:
         """Draw an event or the last value of a column against the first varied key.

@@ -5,6 +5,7 @@ another machine therefore writes the same files. All pages follow from ``evidenc
 case. A run of some cases replaces their entries and does not change the others.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from itertools import chain, groupby
 from os.path import commonprefix
@@ -26,6 +27,7 @@ INTRODUCTION = (
     "series of unrelated meshes. Each case names wrong changes of the code (mutants) with which it must fail; "
     "`make mutants` runs each mutant until a case catches it, or against the tests that it names.")
 OF_READERS = "Mutants that tests must catch"
+TEST = re.compile(r"tests/test_(\w+)\.py::test_")
 NOT_RUN = {"verdict": "not run", "numbers": 0, "errors": [], "table": []}
 
 
@@ -199,11 +201,14 @@ def mutant_state() -> str:
 
 
 def mutant_blocks(stages: Mapping[str, Iterable[Mutant]], state: str) -> list[str]:
-    """A table a stage: mutants, and the cases or tests that caught them when they were last run."""
+    """A table a stage: mutants, and the cases or tests that caught them when they were last run.
+
+    A test is written as its file and its name without "test", so that the page stays short.
+    """
     records = runner.recorded()
     blocks = [state]
     for stage, chosen in stages.items():
-        rows = [(mutant.id, mutant.says, ", ".join(records[mutant.id]["caught_by"]) or "not caught")
-                for mutant in chosen]
+        caught = {mutant.id: ", ".join(records[mutant.id]["caught_by"]) or "not caught" for mutant in chosen}
+        rows = [(mutant.id, mutant.says, TEST.sub(r"\1: ", caught[mutant.id])) for mutant in chosen]
         blocks += [f"## {stage}", table(("mutant", "what is wrong with it", "caught by"), rows)]
     return blocks

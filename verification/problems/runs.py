@@ -1,12 +1,15 @@
 """Runs that cases share, their results, and the averaged pore of :mod:`reference.averaged_pore`."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass, replace
 from operator import itemgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference import averaged_pore, whole_run
+from reference import whole_run
 from repro import results
 from repro.fem.outline import Outline
 from repro.fem.walls import TOP
@@ -22,6 +25,9 @@ from repro.scene import Kinetics, Scene, Substrates
 from verification.evidence.checks import columns
 from verification.problems import channels, meshes
 from verification.problems.schemes import Change, Exchange, exchange, load_scene
+
+if TYPE_CHECKING:
+    from reference import averaged_pore
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
@@ -238,6 +244,8 @@ SECTIONS = 81
 
 def pore_of(scene: Scene, speed=None) -> averaged_pore.Pore:
     """The averaged pore of a scene. speed: (loss, half length) -> u, by default the mean velocity of the scene."""
+    from reference import averaged_pore  # FiPy, which figures do not need
+
     law = scene.kinetics
     both = scene.substrates
     drive = scene.flow
@@ -255,6 +263,8 @@ def half_disc_radius(area: float) -> float:
 
 def half_disc(scene: Scene, speed=None, cells: int = CELLS) -> averaged_pore.Averaged:
     """The averaged run of a half-disc with the area of the meshed seed. Each side has three times as many cells."""
+    from reference import averaged_pore
+
     radius = half_disc_radius(seeded(scene).outline.area)
     return averaged_pore.Averaged(pore_of(scene, speed), *averaged_pore.half_ellipse(radius, radius, cells), 3 * cells,
                                   keeps_shape=True)
