@@ -66,15 +66,6 @@ def warned(scene, reach=None):
     return simplifications.find_warnings(scene, speed, later(scene, reach))
 
 
-@pytest.mark.parametrize("name, overrides", [*((name, ()) for name in packaged_scenes()),
-                                             ("base", ("numerics.preset=fast",)),
-                                             ("wide", ("numerics.preset=accurate",))])
-def test_the_mesh_is_that_of_the_run(name, overrides):
-    scene = load_scene(name, overrides)
-    report, grid = check(scene, run=False), seeded(scene).mesh
-    assert (report.nodes, report.triangles) == (len(grid.points), len(grid.biomass))
-
-
 def test_the_numbers_of_base_are_those_of_table_1():
     """The expected numbers are computed by hand in SI units."""
     computed, _ = examine("base", "growth.end=24 h")
@@ -116,16 +107,6 @@ def test_half_a_pore_has_the_numbers_of_the_whole_one():
         share = 2 if name.startswith("Damkoehler") else 1
         if name != "cell Peclet":
             assert half[name].start == pytest.approx(share * number.start, rel=1e-12), name
-
-
-@pytest.mark.parametrize("name, overrides, reach, keys", [
-    ("base", (), None, []), ("base", ("numerics.preset=fast",), None, []),
-    ("base", ("numerics.preset=accurate",), None, []), ("flow_only", (), None, []), ("initial_mesh", (), None, []),
-    ("wide", (), 160.0, ["pore.length"]), ("wide", (), 140.0, []),
-])
-def test_packaged_scenes_have_these_warnings(name, overrides, reach, keys):
-    """An aggregate that comes within 1.5 widths of an end causes one."""
-    assert examine(name, *overrides, reach=reach)[1] == keys
 
 
 QUIET = ("base", "numerics.preset=paper", "growth.end=5 h", "pore.length=2000 um")
@@ -241,21 +222,6 @@ def test_a_warning_speaks_of_no_part_that_the_scene_leaves_out(name, changes):
             assert scene.flow or scene.substrates
             assert simplifications._has(scene, warning.key.rpartition(".")[0] or warning.key)
             assert not [words for words in absent if re.search(words, warning.text)], (parts, warning)
-
-
-def test_every_check_warns_in_one_of_these_scenes():
-    """Each part that a check needs is one that the scene must have."""
-    quiet = {find.__name__ for find in simplifications.CHECKS}
-    for name, *changes in WARNED:
-        scene = load_scene(name, changes)
-        for find, parts in simplifications.CHECKS.items():
-            if all(simplifications._has(scene, part) for part in parts):
-                speed = (scene.flow.mean_velocity or CLEAN) if scene.flow else None
-                end = later(scene)
-                by_name = {number.name: number for number in numbers.numbers(scene, speed, end)}
-                own = [*find(scene, by_name, end or numbers.at_start(scene))]
-                quiet -= {find.__name__} if own else set()
-    assert quiet == set()
 
 
 def test_the_drag_in_the_warning_is_that_on_a_small_half_cylinder():

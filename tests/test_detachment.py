@@ -6,14 +6,11 @@ bonded wall that is made longer.
 import numpy as np
 import pytest
 
-from repro import results
 from repro.fem import elements
-from repro.march.state import Report
 from repro.model import adhesion, contact, remeshing
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
-from repro.model.solving import solve
 from repro.scene import load_scene
 from tests.strategies import coarse_base
 
@@ -51,11 +48,3 @@ def test_theta_of_parts_stays_within_that_of_their_triangles():
     assert (theta @ fitted.T).min() < 0
     parts = adhesion.with_finer_lines(pore.with_body(theta=theta), 0.4).body.theta
     assert parts.min() >= 1.0 and parts.max() <= 40.0 and np.ptp(parts) > 10.0
-
-
-def test_stresses_on_walls_are_computed_only_for_a_scene_with_a_strength(monkeypatch):
-    for name in ("wall_peak", "tensile_peak", "fluid_loads"):
-        monkeypatch.setattr(adhesion, name, lambda *_: pytest.fail("a stress was computed"))
-    scene, pore = coarse_base(1)
-    row = results.row(scene, Report(pore, solve(scene, pore), None, (), 0, {}))
-    assert row["wall_traction_max_MPa"] is None and row["fluid_force_x_uN_per_m"] is None

@@ -204,6 +204,7 @@ def test_the_examples_of_the_tutorial_run(tmp_path, capsys, monkeypatch):
     assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]
 
 
+@pytest.mark.thorough
 def test_the_examples_of_the_how_to_pages_run(tmp_path, capsys, monkeypatch):
     """With a run of base to 1 h as runs/mine. test_sweep_cluster has clusters; PyVista reads and does not draw."""
     monkeypatch.chdir(tmp_path)
