@@ -23,23 +23,17 @@ from repro.preflight.modelled import describe_model
 from repro.preflight.numbers import Sizes
 from repro.preflight.outlook import CoarseRun, sketched
 from repro.results.tables import solve
-from repro.runs import progress
 from repro.scene import SceneError, load_scene, packaged_scenes, scene_tables
 from repro.scene.units import units_of
 from repro.schemes import CURVED
-from tests import faults
 from tests.shell import refusal
 from tests.strategies import coarse_base
 from verification.problems import family
 
+pytestmark = pytest.mark.usefixtures("without_progress")
+
 #: Mean velocity of the clean channel of base: (1e-3 cm / 600 um) g W^2 / (12 nu), um/h.
 CLEAN = 1e-5 / 600e-6 * 9.81 * (50e-6) ** 2 / (12 * 1.003e-6) * 3600e6
-
-
-@pytest.fixture(autouse=True)
-def without_progress(monkeypatch):
-    """No line of progress appears, however slow the machine is."""
-    monkeypatch.setattr(progress, "TICK", 600.0)
 
 
 def examine(name, *overrides, reach=None):
@@ -407,10 +401,8 @@ def test_check_prints_json(capsys):
 @pytest.mark.parametrize("override, excerpt", [
     ("pore.widht=5 um", "did you mean width?"),
     ("flow.head=1e-300 um", "base: it cannot be run: stopped in the step from t = 0 h, in transport"),
-    ("numerics.solver=pardiso", "pypardiso"),
 ])
-def test_a_scene_that_cannot_run_is_refused(tmp_path, override, excerpt, capsys, monkeypatch):
-    faults.remove_package(monkeypatch, "pypardiso")
+def test_a_scene_that_cannot_run_is_refused(tmp_path, override, excerpt, capsys):
     assert excerpt in refusal(tmp_path, capsys, "check", "base", "--set", override)
 
 

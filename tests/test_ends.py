@@ -77,11 +77,11 @@ def ended(name, scheme, *changes):
 
 
 @pytest.mark.parametrize("name, scheme", [
-    pytest.param(name, scheme, marks=[pytest.mark.thorough] if (name, scheme) == ("fold", "midpoint") else [])
+    pytest.param(name, scheme, marks=pytest.mark.thorough if name == "fold" else ())
     for name in CASES for scheme in ("updates", "midpoint")])
 def test_every_end_is_located_within_its_step(name, scheme):
     """The last row is at the event, to the accuracy of events. The requested rows before it are kept, and none follows.
-    The ledgers lead to the event. `test_fold.py` has the fold of the midpoint rule."""
+    The ledgers lead to the event."""
     case = CASES[name]
     rows, ledgers, status = ended(name, scheme)
     margins = [case.margin(row) for row in rows]

@@ -165,6 +165,7 @@ def test_every_block_is_of_a_kind_that_is_executed():
     assert len(readme.encode()) < 8_500 and readme.index("overview.png") < readme.index("make env") < 2_500
 
 
+@pytest.mark.thorough
 def test_the_examples_of_the_readme_run(tmp_path, capsys, monkeypatch):
     """Its commands run in their order in one folder; its scene is base; its Python runs."""
     monkeypatch.chdir(tmp_path)

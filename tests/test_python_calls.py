@@ -2,7 +2,6 @@
 
 import inspect
 import io
-import pydoc
 from contextlib import redirect_stderr
 from functools import partial
 
@@ -159,11 +158,3 @@ def test_a_bar_is_shown_if_it_is_asked_for(call, reached, tmp_path, monkeypatch)
     with redirect_stderr(io.StringIO()) as shown:
         call(tmp_path)
     assert shown.getvalue() == ""
-
-
-def test_help_shows_functions_before_errors_and_no_address():
-    text = pydoc.render_doc(repro, renderer=pydoc.plaintext)
-    names = {name for name in repro.__all__ if not isinstance(getattr(repro, name), type)}
-    errors = [name for name in dir(repro) if name not in repro.__all__]
-    assert all(0 < text.find(f"    {name}(") < text.find("Errors:") for name in names) and " at 0x" not in text
-    assert errors and all(text.find("Errors:") < text.find(name) for name in errors) and "class OutputError" not in text

@@ -266,6 +266,7 @@ def two_points():
     return make_points("pore.width=48 um, 50 um", source="flow_only")
 
 
+@pytest.mark.thorough
 def test_a_process_killed_between_runs_costs_none(tmp_path):
     """Another process makes the next run."""
     with closing(pool.Processes()) as processes:
