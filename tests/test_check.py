@@ -279,7 +279,7 @@ def test_a_look_ends_within_a_step():
 def test_the_outlook_says_how_a_run_ends():
     near = load_scene("base", ["aggregate.position=285 um", FAST])
     assert re.match("the run ends there: the aggregate reaches the pore's downstream end at t = ",
-                    check(near).outlook.stopped)
+                    CoarseRun(near).run(lambda _: None, 300.0).stopped)
     assert check(near, run=False).outlook is None
 
 
