@@ -6,7 +6,9 @@ import matplotlib
 import numpy
 import pytest
 from hypothesis import HealthCheck, settings
+from matplotlib import pyplot
 
+from repro.runs import progress
 from tests import browser, pages
 
 matplotlib.use("Agg")
@@ -30,6 +32,19 @@ def run_fixture(name, *arguments):
 fast = run_fixture("fast", "base", pages.FAST, 'growth.end="3 h"', 'output.every="0.5 h"')
 paper = run_fixture("paper", "base", 'growth.end="1 h"')
 flow_only = run_fixture("flow_only", "flow_only")
+
+
+@pytest.fixture
+def without_progress(monkeypatch):
+    """No line of progress appears, however slow the machine is."""
+    monkeypatch.setattr(progress, "TICK", 600.0)
+
+
+@pytest.fixture
+def close_figures():
+    """No figure of pyplot outlives its test."""
+    yield
+    pyplot.close("all")
 
 
 @pytest.fixture(scope="module")

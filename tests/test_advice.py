@@ -15,8 +15,7 @@ import pytest
 from repro.cli import main
 from repro.errors import SimulationError
 from repro.march.simulation import simulate
-from repro.model import meshing, solving
-from repro.model.meshing import seeded
+from repro.model import meshing
 from repro.preflight import memory, numbers, simplifications
 from repro.runs import machine
 from repro.scene import SceneError, load_scene, parse_scene
@@ -326,26 +325,6 @@ def test_the_advice_against_a_lack_of_memory_is_accepted_and_helps(monkeypatch, 
         else:
             assert memory.expected_bytes(coarser) > 0.49 * free and "no numerics.refinement" in str(refused.value)
     assert outcomes == {True, False}
-
-
-@pytest.mark.thorough
-def test_forces_of_the_fluid_are_advised_and_act_on_a_permeable_aggregate():
-    """In a minute of growth, which moves the top by 0.03 um, the force strains the seed by the ratio of the warning,
-    which is an estimate of its order: within a factor of four."""
-    changes = ["numerics.preset=fast", "growth.end=1 min", "growth.time_step=1 min", "growth.shear_modulus=0.3 Pa",
-               "aggregate.radius=20 um", "flow.permeability=1e-13 m^2"]
-    neglected, included = (load_scene("base", [*changes, f"growth.fluid_forces={word}"])
-                           for word in ("neglected", "included"))
-    state = seeded(neglected)
-    speed, sizes = solving.solve(neglected, state).flow.mean_velocity, numbers.reached(state)
-    computed = numbers.numbers(neglected, speed, sizes)
-    keys = [[warning.key for warning in simplifications.find_warnings(scene, speed, sizes)]
-            for scene in (neglected, included)]
-    assert ["growth.fluid_forces" in each for each in keys] == [True, False]
-    stress = next(number.end for number in computed if number.name == "fluid stress over modulus")
-    tops = [max(outline.points, key=lambda point: point[1])
-            for outline in (state.outline, [*simulate(included)][-1].pore.outline)]
-    assert 0.25 < math.dist(*tops) / (stress * 20) < 4
 
 
 @pytest.mark.parametrize("radius, start, remedy, end", [

@@ -4,15 +4,11 @@ import re
 import subprocess
 import sys
 
-import numpy as np
 import pytest
-from PIL import Image
 
-from repro.fem.mesh import triangle_areas
 from tests.blocks import ROOT
-from verification.evidence import case_pages, first_mesh, pages
+from verification.evidence import case_pages, pages
 from verification.evidence.cases import KINDS, STAGES, cases
-from verification.problems import meshes
 
 RECORDS = pages.recorded()
 
@@ -46,19 +42,6 @@ def test_every_command_chooses_the_case_among_those_of_its_function():
     assert commands["hard-pores"].endswith('hard_pores.py::test_pore -k "hard-pores and not hard-pores-rest"')
     assert commands["hard-pores-rest"].endswith('hard_pores.py::test_pore -k "hard-pores-rest"')
     assert len({*commands.values()}) == len(commands)
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_drawing_shows_the_biomass_where_it_is(order, tmp_path):
-    """The share of its colour is that of its area, and it is below the water."""
-    mesh = meshes.half_disc(20.0, 0.25, (-40.0, 40.0), 50.0, geometry=order)
-    first_mesh.draw(mesh, tmp_path / "mesh.png")
-    pixels = np.asarray(Image.open(tmp_path / "mesh.png").convert("RGB"), int)
-    water, biomass = (np.abs(pixels - [*bytes.fromhex(colour[1:])]).sum(axis=2) < 30 for colour in first_mesh.COLOURS)
-    areas = triangle_areas(mesh.points, mesh.triangles)
-    share = areas[mesh.biomass].sum() / areas.sum()
-    assert biomass.sum() / (water.sum() + biomass.sum()) == pytest.approx(share, rel=0.1)
-    assert np.nonzero(biomass)[0].mean() > np.nonzero(water)[0].mean()
 
 
 @pytest.mark.thorough

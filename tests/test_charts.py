@@ -170,12 +170,6 @@ def test_many_points_are_thinned_with_both_ends():
     assert (thin.values == thin.times**2).all() and thin.dots
 
 
-@pytest.mark.parametrize("low, begins", [(1.0, 0.0), (4.9, 0.0), (5.1, 4.0), (9.0, 9.0)])
-def test_an_axis_begins_at_zero_if_zero_is_near(low, begins):
-    first, last = charts._roomy(low, 10.0)
-    assert first == begins and last >= 10.0
-
-
 def test_the_colours_of_values_are_those_of_matplotlib():
     """To 6 of 255, the error of linear colours between a sixteenth of the scale."""
     colours = np.array([[*bytes.fromhex(colour[1:])] for colour in viridis(256)])

@@ -23,23 +23,17 @@ from repro.preflight.modelled import describe_model
 from repro.preflight.numbers import Sizes
 from repro.preflight.outlook import CoarseRun, sketched
 from repro.results.tables import solve
-from repro.runs import progress
 from repro.scene import SceneError, load_scene, packaged_scenes, scene_tables
 from repro.scene.units import units_of
 from repro.schemes import CURVED
-from tests import faults
 from tests.shell import refusal
 from tests.strategies import coarse_base
 from verification.problems import family
 
+pytestmark = pytest.mark.usefixtures("without_progress")
+
 #: Mean velocity of the clean channel of base: (1e-3 cm / 600 um) g W^2 / (12 nu), um/h.
 CLEAN = 1e-5 / 600e-6 * 9.81 * (50e-6) ** 2 / (12 * 1.003e-6) * 3600e6
-
-
-@pytest.fixture(autouse=True)
-def without_progress(monkeypatch):
-    """No line of progress appears, however slow the machine is."""
-    monkeypatch.setattr(progress, "TICK", 600.0)
 
 
 def examine(name, *overrides, reach=None):
@@ -64,15 +58,6 @@ def warned(scene, reach=None):
     """The warnings at t = 0 and at a later size."""
     speed = (scene.flow.mean_velocity or CLEAN) if scene.flow else None
     return simplifications.find_warnings(scene, speed, later(scene, reach))
-
-
-@pytest.mark.parametrize("name, overrides", [*((name, ()) for name in packaged_scenes()),
-                                             ("base", ("numerics.preset=fast",)),
-                                             ("wide", ("numerics.preset=accurate",))])
-def test_the_mesh_is_that_of_the_run(name, overrides):
-    scene = load_scene(name, overrides)
-    report, grid = check(scene, run=False), seeded(scene).mesh
-    assert (report.nodes, report.triangles) == (len(grid.points), len(grid.biomass))
 
 
 def test_the_numbers_of_base_are_those_of_table_1():
@@ -116,16 +101,6 @@ def test_half_a_pore_has_the_numbers_of_the_whole_one():
         share = 2 if name.startswith("Damkoehler") else 1
         if name != "cell Peclet":
             assert half[name].start == pytest.approx(share * number.start, rel=1e-12), name
-
-
-@pytest.mark.parametrize("name, overrides, reach, keys", [
-    ("base", (), None, []), ("base", ("numerics.preset=fast",), None, []),
-    ("base", ("numerics.preset=accurate",), None, []), ("flow_only", (), None, []), ("initial_mesh", (), None, []),
-    ("wide", (), 160.0, ["pore.length"]), ("wide", (), 140.0, []),
-])
-def test_packaged_scenes_have_these_warnings(name, overrides, reach, keys):
-    """An aggregate that comes within 1.5 widths of an end causes one."""
-    assert examine(name, *overrides, reach=reach)[1] == keys
 
 
 QUIET = ("base", "numerics.preset=paper", "growth.end=5 h", "pore.length=2000 um")
@@ -243,21 +218,6 @@ def test_a_warning_speaks_of_no_part_that_the_scene_leaves_out(name, changes):
             assert not [words for words in absent if re.search(words, warning.text)], (parts, warning)
 
 
-def test_every_check_warns_in_one_of_these_scenes():
-    """Each part that a check needs is one that the scene must have."""
-    quiet = {find.__name__ for find in simplifications.CHECKS}
-    for name, *changes in WARNED:
-        scene = load_scene(name, changes)
-        for find, parts in simplifications.CHECKS.items():
-            if all(simplifications._has(scene, part) for part in parts):
-                speed = (scene.flow.mean_velocity or CLEAN) if scene.flow else None
-                end = later(scene)
-                by_name = {number.name: number for number in numbers.numbers(scene, speed, end)}
-                own = [*find(scene, by_name, end or numbers.at_start(scene))]
-                quiet -= {find.__name__} if own else set()
-    assert quiet == set()
-
-
 def test_the_drag_in_the_warning_is_that_on_a_small_half_cylinder():
     drag, _, _ = half_cylinder.solve(1e-3).load()
     assert simplifications.DRAG == pytest.approx(drag, rel=2e-3)  # the rest is of the order of R / W
@@ -319,7 +279,7 @@ def test_a_look_ends_within_a_step():
 def test_the_outlook_says_how_a_run_ends():
     near = load_scene("base", ["aggregate.position=285 um", FAST])
     assert re.match("the run ends there: the aggregate reaches the pore's downstream end at t = ",
-                    check(near).outlook.stopped)
+                    CoarseRun(near).run(lambda _: None, 300.0).stopped)
     assert check(near, run=False).outlook is None
 
 
@@ -453,10 +413,8 @@ def test_check_prints_json(capsys):
 @pytest.mark.parametrize("override, excerpt", [
     ("pore.widht=5 um", "did you mean width?"),
     ("flow.head=1e-300 um", "base: it cannot be run: stopped in the step from t = 0 h, in transport"),
-    ("numerics.solver=pardiso", "pypardiso"),
 ])
-def test_a_scene_that_cannot_run_is_refused(tmp_path, override, excerpt, capsys, monkeypatch):
-    faults.remove_package(monkeypatch, "pypardiso")
+def test_a_scene_that_cannot_run_is_refused(tmp_path, override, excerpt, capsys):
     assert excerpt in refusal(tmp_path, capsys, "check", "base", "--set", override)
 
 

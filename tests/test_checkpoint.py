@@ -14,7 +14,7 @@ from repro.errors import CheckpointError
 from repro.march.simulation import steps
 from repro.march.state import SAME_TIME
 from repro.runs import checkpoint, state_arrays
-from repro.runs.checkpoint import NEWEST, PREVIOUS, decode, encode
+from repro.runs.checkpoint import NEWEST, PREVIOUS, decode
 from repro.runs.execution import Watch, run
 from repro.runs.recorder import Recorder
 from repro.scene import load_scene
@@ -47,18 +47,6 @@ def restored(saved, content, path):
     recorder = Recorder(scene, folder)
     recorder.restore(path)
     return recorder
-
-
-def test_an_array_keeps_its_layout():
-    """The order by rows or columns, the type and the numbers stay. Arrays that are read can be written to."""
-    numbers = np.arange(6).reshape(2, 3)
-    arrays = {"rows": numbers.astype(float), "columns": np.asfortranarray(numbers), "none": np.zeros(0),
-              "flags": np.array([True, False]), "short": np.arange(3, dtype=np.int32), "edge": np.array([-0.0, 5e-324])}
-    _, decoded_arrays = decode(encode({}, arrays))
-    for name, array in arrays.items():
-        computed = decoded_arrays[name]
-        assert computed.tobytes() == array.tobytes() and computed.dtype == array.dtype
-        assert computed.flags.c_contiguous == array.flags.c_contiguous and computed.flags.writeable
 
 
 def test_the_previous_checkpoint_is_kept(tmp_path):

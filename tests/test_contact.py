@@ -1,6 +1,5 @@
 """Films and wedges that close (2.3.3): nodes of straight edges, and contact lines anywhere on arcs."""
 
-import dataclasses
 import signal
 from dataclasses import replace
 
@@ -21,9 +20,9 @@ from repro.model import closing_by_lines, contact, contact_lines, contact_newton
 from repro.model.closing_by_lines import ByLines, divided
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.configuration import FromPrevious
-from repro.model.contact_lines import PATIENT, Clearance, Contact, surface_ends
+from repro.model.contact_lines import PATIENT, Clearance, Contact
 from repro.model.mechanics import Mechanics
-from repro.model.meshing import initial_outlines, seeded
+from repro.model.meshing import seeded
 from repro.runs.execution import Watch, resume, run
 from repro.runs.state_arrays import pack_state, unpack_state
 from repro.scene import load_scene
@@ -529,14 +528,3 @@ def test_each_contact_surface_has_its_own_fixed_point(order):
     shape = contact.expand(Mechanics.of(scene), aside, [1.02 * aside.body.theta]).pore
     before, after = (one.mesh.points[one.mesh.loop][one.body.fixed] for one in (aside, shape))
     assert len(before) == 2 and after == pytest.approx(before, abs=1e-9) and abs(before[:, 0] - x).min() > 0.3
-
-
-def test_contact_lines_do_not_depend_on_the_first_node():
-    """If the numbers of the ring's nodes are shifted, the same positions result."""
-    (outline,) = initial_outlines(load_scene("base"))
-    expected = set(surface_ends(outline, BOTTOM))
-    assert {step for _, step in expected} == {-1, 1} and len(expected) == 2
-    for shift in range(1, len(outline.wall)):
-        parts = {name: np.roll(getattr(outline, name), shift, axis=0) for name in ("points", "wall", "fixed")}
-        moved = surface_ends(dataclasses.replace(outline, **parts), BOTTOM)
-        assert {((node - shift) % len(outline.wall), step) for node, step in moved} == expected

@@ -6,15 +6,12 @@ bonded wall that is made longer.
 import numpy as np
 import pytest
 
-from repro import results
 from repro.fem import elements
-from repro.march.state import Report
 from repro.model import adhesion, contact, remeshing
 from repro.model.finer_lines import with_finer_lines
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
-from repro.model.solving import solve
 from repro.scene import load_scene
 from tests.strategies import coarse_base
 
@@ -55,11 +52,3 @@ def test_theta_of_parts_stays_positive_and_keeps_its_sum():
     parts = fine.body.theta
     assert 0.1 < parts.min() and parts.max() < 400 and np.ptp(parts) > 10.0
     assert np.sum(parts * fine.body.solid.at.dx) == pytest.approx(np.sum(theta * pore.body.solid.at.dx), rel=1e-12)
-
-
-def test_stresses_on_walls_are_computed_only_for_a_scene_with_a_strength(monkeypatch):
-    for name in ("wall_peak", "tensile_peak", "fluid_loads"):
-        monkeypatch.setattr(adhesion, name, lambda *_: pytest.fail("a stress was computed"))
-    scene, pore = coarse_base(1)
-    row = results.row(scene, Report(pore, solve(scene, pore), None, (), 0, {}))
-    assert row["wall_traction_max_MPa"] is None and row["fluid_force_x_uN_per_m"] is None

@@ -33,6 +33,8 @@ CONTRIBUTORS = [
       for name in ("at_most", "at_least", "between", "study", "studies", "Check", "Study")),
     "verification.mutants.Mutant", "verification.mutants.changes", "paper_figures.runs.Request"]
 PUBLIC = USERS + METHODS + CONTRIBUTORS
+#: Examples with runs of a second or more.
+LONG = {"repro.Meeting", "repro.resume"}
 #: Names in CONTRIBUTING.md that a contributor writes or reads, and does not call. The keys of Substrate, Acceptor and
 #: Donor state unit, default, range and source in their entries.
 NOT_CALLED = {"caption", "draw", "derived_row", "case", "Substrate", "Acceptor", "Donor", "Stages", "Energy", "Wall"}
@@ -80,7 +82,8 @@ def test_a_docstring_is_complete(name):
 
 
 @pytest.mark.exact_lengths
-@pytest.mark.parametrize("name", PUBLIC)
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=pytest.mark.thorough if name in LONG else ()) for name in PUBLIC])
 def test_the_examples_of_a_docstring_run(name, capsys):
     (document,) = doctest.DocTestFinder(recurse=False).find(target(name), name, globs={})
     result = doctest.DocTestRunner(verbose=False).run(document)

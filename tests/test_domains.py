@@ -2,6 +2,8 @@
 
 A power, root, logarithm or quotient does not exist there: of J < 0, of an area of zero, of a number that overflows.
 """
+import gc
+import weakref
 from functools import cache, partial
 
 import numpy as np
@@ -20,7 +22,7 @@ from repro.model.meshing import seeded
 from repro.model.solving import Solver
 from repro.model.uptake_law import LAWS
 from repro.scene import load_scene
-from tests.strategies import coarse_base, half_disc
+from tests.strategies import half_disc
 
 TOWER = 'aggregate.outline=[["-25 um","0 um"],["-15 um","50 um"],["15 um","50 um"],["25 um","0 um"]]'
 FAST = ["numerics.preset=fast", "numerics.refinement=0.25"]
@@ -29,28 +31,11 @@ OUT_OF_DOMAIN = "an iterate leaves the domain of its equations"
 HUGE = 1e200
 
 
-@pytest.fixture(autouse=True)
-def _as_in_a_run():
-    """Floating-point errors raise in a run."""
-    with np.errstate(all="raise", under="ignore"):
-        yield
-
-
 def turned_over(points, nodes):
     """Points with the aggregate's nodes mirrored."""
     mirrored = points.copy()
     mirrored[nodes] *= [-1, 1]
     return mirrored
-
-
-@pytest.mark.parametrize("geometry", [1, 2])
-def test_an_equilibrium_from_a_triangle_that_is_turned_over_fails_in_growth(geometry):
-    body, constrained, _, _ = half_disc(5.0, geometry=geometry)
-    J = body.strained(body.reference).J
-    first = growth.Equilibrium(body.reference * [-1, 1], np.zeros(body.shape.corners), 0)
-    system = growth.System(body, constrained, stabilisation=growth.STABILISATIONS[geometry].on(body, body.reference))
-    with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
-        growth.reach(system, J, 1.1 * J, first, first.position)
 
 
 @cache
@@ -118,27 +103,10 @@ def test_newtons_method_starts_again_if_its_guess_overflows(law):
     assert computed.fields == pytest.approx(expected.fields, rel=1e-6, abs=1e-9)  # NEWTON is 1e-11 of a row's terms
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_mesh_with_a_collapsed_triangle_fails_in_meshing(order):
-    pore = coarse_base(order)[1]
-    triangle = pore.mesh.triangles[np.flatnonzero(~pore.mesh.biomass)[0]]
-    points = pore.mesh.points.copy()
-    points[triangle[2]] = points[triangle[0]]
-    with pytest.raises(MeshError, match=OUT_OF_DOMAIN):
-        mesh_motion.move(pore.mesh.moved(points), points[pore.mesh.body], 1.0)
-
-
 def test_a_point_in_a_collapsed_triangle_fails_in_the_transfer():
     points = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
     with pytest.raises(TransferError, match=OUT_OF_DOMAIN):
         transfer.located(points, np.array([[0, 1, 2]]), np.array([[0.5, 0.0]]))
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_surface_with_a_triangle_that_is_turned_over_fails_in_growth(order):
-    pore = coarse_base(order)[1]
-    with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
-        surface.surface(pore.moved(turned_over(pore.mesh.points, pore.mesh.body)))
 
 
 def run(monkeypatch, *changes, unset=()):
@@ -200,3 +168,49 @@ def test_a_run_finds_contact_lines_by_equilibria_if_newtons_method_leaves_its_do
     step = ["growth.time_step=0.01 h", "growth.end=0.08 h", 'output.times=["0.08 h"]']
     attempts, end = run(monkeypatch, TOWER, *step, unset=["aggregate.radius"])
     assert end == 0.08 and not any(error for _, error in attempts)
+
+
+# ---------------------------------------------------------------- growth
+
+
+GEOMETRIES = pytest.mark.parametrize("geometry", [1, 2])
+
+
+def constant(body, theta):
+    """(t, q) expansion from one value or one value per triangle (t,)."""
+    return np.broadcast_to(np.reshape(theta, (-1, 1)), body.at.dx.shape).astype(float)
+
+
+def at_rest(body, constrained, theta, prescribed=None):
+    """Return the equilibrium from the reference under theta (t, q)."""
+    target = body.reference if prescribed is None else prescribed
+    return growth.equilibrium(body, theta, body.reference, np.zeros(body.shape.corners), constrained, target)
+
+
+@GEOMETRIES
+def test_a_start_that_is_turned_over_is_refused(geometry):
+    """det F <= 0 is detected before any division by it, and so is theta <= 0."""
+    body, constrained, rim, _ = half_disc(5.0, geometry=geometry)
+    folded, push = body.reference.copy(), np.zeros(body.shape.corners)
+    folded[np.setdiff1d(np.arange(body.shape.corners), rim)[0]] += 100.0
+    for start in (folded, body.reference * [-1, 1], body.reference * [1, 0]):
+        assert body.strained(start).J.min() <= 0
+        with pytest.raises(GrowthError, match="turned over"):
+            growth.equilibrium(body, constant(body, 1.0), start, push, constrained, start)
+    for theta in (-1.0, 0.0):
+        with pytest.raises(GrowthError, match="turned over or from theta <= 0"):
+            at_rest(body, constrained, constant(body, theta))
+
+
+def test_an_unused_system_is_freed():
+    """It stores fields at every quadrature point."""
+    gc.disable()
+    try:
+        body, constrained, _, _ = half_disc(5.0, 0.5, geometry=2)
+        system = growth.System(body, constrained)
+        system.under(constant(body, 1.1), body.reference, body.reference, np.zeros(body.shape.corners))
+        alive = weakref.ref(system)
+        del system
+        assert alive() is None
+    finally:
+        gc.enable()

@@ -12,6 +12,8 @@ from repro.cli import main
 from tests import faults
 from tests.shell import refusal
 
+pytestmark = pytest.mark.usefixtures("close_figures")
+
 CONTACT = ['numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"',
            "output.every=0.2 h"]
 
@@ -19,12 +21,6 @@ CONTACT = ['numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width=
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     return repro.run("base", tmp_path_factory.mktemp("run"), CONTACT)
-
-
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
 
 
 def test_curves_are_the_columns_with_the_time_of_contact(results):

@@ -10,14 +10,13 @@ from repro.errors import ErosionError
 from repro.fem import recession
 from repro.fem.outline import half_disc, polygon
 from repro.fem.walls import BOTTOM, FREE, channel_walls
-from repro.march import eroding, simulation
+from repro.march import eroding
 from repro.model.erosion import Erosion
 from repro.model.meshing import seeded
 from repro.model.stages import Stages
-from repro.runs.state_arrays import pack_state, unpack_state
 from repro.runs.status import is_over
 from repro.scene import SceneError, load_scene
-from verification.problems.erosion import MU, erosion, layer, middle_thickness, shaped
+from verification.problems.erosion import MU, erosion, shaped
 from verification.problems.erosion import half_disc as growing_disc
 
 WALLS = channel_walls(50.0)
@@ -53,15 +52,6 @@ def test_straight_sides_recede_in_parallel(angle):
     chords = arcs[:, 2] - arcs[:, 0]
     part = np.sum((arcs[:, 1] - arcs[:, 0]) * chords, axis=1) / np.sum(chords**2, axis=1)
     assert np.abs(part - 0.5).max() <= recession.CENTRED and (shape.wall[[0, -1]] == [BOTTOM, FREE]).all()
-
-
-@pytest.mark.parametrize("wall", [0, 1])
-def test_a_half_disc_recedes_to_a_half_disc(wall):
-    outline = half_disc(10.0, 8.0, 2, 3.0, WALLS[wall])
-    shape = receded(outline, 4.0)
-    free = shape.wall == FREE
-    assert np.hypot(*(shape.points[free] - [3.0, WALLS[wall].y]).T) == pytest.approx(6.0, abs=1e-6)
-    assert (shape.upstream, shape.downstream) == pytest.approx((-3.0, 9.0))
 
 
 def test_two_arcs_of_a_circle_join_to_an_arc_with_its_middle():
@@ -182,35 +172,12 @@ def test_a_run_ends_as_steady_only_if_asked_for_and_steady(radius, steady):
     assert run(growing_disc(radius, *changes))[1] == "completed"
 
 
-@pytest.mark.thorough
-def test_a_layer_ends_as_steady_near_its_balance():
-    """Its middle follows the logistic curve towards mu / k = 10 um; its ends roll slowly over the wall."""
-    scene = layer(9.0, erosion("thickness squared", 0.01), "growth.until=steady", 'growth.steady_tolerance="5e-3 1/h"',
-                  'growth.end="40 h"', 'output.times=["40 h"]', "numerics.refinement=0.1")
-    reports, status = run(scene)
-    time = reports[-1].pore.time
-    assert status.startswith(f"the aggregates are steady at t = {time:g} h") and 10 < time < 40
-    assert middle_thickness(reports[-1].pore) == pytest.approx(reference.layer(9.0, MU, 0.01, time), rel=1e-3)
-
-
 def test_no_state_is_steady_before_the_last_time_of_a_table():
     scene = growing_disc(10.0, erosion("constant", 0.5), 'growth.end="2 h"', "growth.until=steady",
                          'output.times=["2 h"]',
                          'substrates.donor.supply=[["0 h", "10 mg/L"], ["1 h", "12 mg/L"]]')
     reports, status = run(scene)
     assert status.startswith("the aggregates are steady") and reports[-1].pore.time > 1.0
-
-
-def test_a_run_restarts_after_an_eroding_step_with_the_same_bits():
-    scene = growing_disc(10.0, erosion("thickness squared", 0.01), 'growth.end="4 h"', 'output.times=["4 h"]',
-                         "numerics.refinement=0.1")
-    states = [state for state, _ in simulation.steps(scene)]
-    plain, arrays = pack_state(scene, states[1])
-    again = [state for state, _ in simulation.steps(scene, unpack_state(scene, plain, arrays))]
-    assert len(states) > 3 and len(again) == len(states) - 2
-    assert np.array_equal(again[-1].pore.mesh.points, states[-1].pore.mesh.points)
-    assert [each.detached for state in again for each in state.ledgers] == [
-        each.detached for state in states[2:] for each in state.ledgers]
 
 
 def test_a_step_that_erodes_a_contact_surface_ends_the_run():
@@ -222,20 +189,6 @@ def test_a_step_that_erodes_a_contact_surface_ends_the_run():
     with pytest.raises(repro.Detachment, match=f"^{status}$"):
         eroding.attempt(stages, pore, stages.solver.solve(pore), 2.0)
     assert is_over(status)
-
-
-@pytest.mark.thorough
-def test_an_aggregate_on_both_walls_erodes_until_its_upper_contact_is_gone():
-    """It touches the upper wall by growth. Erosion removes more than growth adds, at both walls."""
-    scene = load_scene("base", ["numerics.preset=fast", "growth.new_biomass=stress_free", 'pore.width="12 um"',
-                                'aggregate.radius="9 um"', 'growth.end="60 h"', 'output.times=["60 h"]',
-                                erosion("thickness squared", 5e-4)])
-    lengths = []
-    with pytest.raises(repro.Detachment, match="erosion takes a contact surface at y = 12 um"):
-        for state, _ in simulation.steps(scene):
-            lengths.append(state.pore.boundary.contact_length(state.pore.mesh.walls[1]))
-    contact = [length for length in lengths if length > 0]
-    assert contact[0] > 2.0 and contact == sorted(contact, reverse=True) and contact[-1] < 1e-3
 
 
 @pytest.mark.parametrize("changes, message", [

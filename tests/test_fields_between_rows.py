@@ -146,15 +146,3 @@ def test_a_dataset_has_fields_on_a_grid():
     assert np.diff(dataset["x_um"]) == pytest.approx(2.0, rel=0.02) and dataset["y_um"].values[1] == 2
     assert results.to_xarray().identical(results.to_xarray([]))
     assert set(results.to_xarray()) < set(dataset)
-
-
-def test_rates_are_columns_of_a_scene_with_kinetics():
-    """Growth over the run follows from its rate, by Simpson's rule over the rows."""
-    results = repro.solve("base", {**FEW, "output.times": ["0 h", "0.1 h", "0.2 h"], "growth.end": "0.2 h"})
-    assert (results["acceptor_uptake_ug_per_m_per_h"] > 0).all()
-    assert results.units["biomass_growth_ug_per_m_per_h"] == "ug/m/h"
-    density = 30_000e-6  # ug/m per um2
-    gained = density * np.diff(results["aggregate_area_um2"][[0, -1]])[0]
-    integral = 0.2 / 6 * (np.array([1, 4, 1]) @ results["biomass_growth_ug_per_m_per_h"])
-    assert integral == pytest.approx(gained, rel=1e-3)
-    assert "biomass_growth_ug_per_m_per_h" not in repro.solve("flow_only")

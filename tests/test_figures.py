@@ -58,6 +58,7 @@ def test_the_printed_command_makes_the_drawn_run(request_):
     assert scene_hash(load_scene(chosen.scene, chosen.set)) == scene_hash(request_.load())
 
 
+@pytest.mark.thorough
 def test_every_figure_is_drawn_and_described(quick):
     """The page has the recorded verdicts beside the claims, every run has its own name, and no link leaves the page."""
     figures.main()

@@ -11,17 +11,12 @@ from repro.errors import StageError
 from repro.model.meshing import MOST_REFINED
 from repro.preflight import refined
 from repro.preflight.refined import Difference, refine
-from repro.runs import progress
 from repro.scene import FINER, PRESETS, SceneError, load_scene
 from tests.shell import refusal
 
+pytestmark = pytest.mark.usefixtures("without_progress")
+
 SHORT = {"growth.end": "0.2 h", "output.times": ["0 h", "0.05 h", "0.2 h"], "numerics.preset": "sketch"}
-
-
-@pytest.fixture(autouse=True)
-def without_progress(monkeypatch):
-    """No line of progress appears, however slow the machine is."""
-    monkeypatch.setattr(progress, "TICK", 600.0)
 
 
 def numbers(scene):

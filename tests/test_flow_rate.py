@@ -3,12 +3,10 @@
 import tomllib
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import repro
 from repro.preflight.modelled import describe_model
-from repro.results.quantities import UNITS
 from repro.scene import scene_hash
 from tests.test_derived import integrate_over_end
 
@@ -92,16 +90,3 @@ def test_forces_of_the_fluid_are_totals_too():
     for axis in "xy":
         per_depth = run[f"fluid_force_{axis}_uN_per_m"]  # 1 uN/m is 0.02 nN in 20 um
         assert run[f"fluid_force_{axis}_nN"] == pytest.approx(0.02 * per_depth)
-
-
-def test_units_of_totals_are_those_of_their_names():
-    """A um3/h is 1e-9 uL/60 min, and a um3 mg/L is 1e-6 pg."""
-    assert UNITS["_uL_per_min"].factor == pytest.approx(1e-9 / 60) and UNITS["_pg_per_h"].factor == 1e-6
-
-
-def test_a_sweep_of_rates_replaces_the_other_drive(tmp_path):
-    swept = repro.sweep("flow_only", ["flow.rate=3 uL/day, 6 uL/day"], tmp_path, {"pore.depth": "20 um"}, workers=1)
-    velocities = swept.to_pandas()["mean_velocity_m_per_d"].to_numpy()
-    assert velocities[1] == pytest.approx(2 * velocities[0]) and np.isfinite(velocities).all()
-    with pytest.raises(repro.SceneError, match="it and flow.head exclude each other"):
-        repro.sweep("flow_only", ["flow.rate=3 uL/day", "flow.head=1 mm"], tmp_path, workers=1)

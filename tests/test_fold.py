@@ -29,10 +29,8 @@ from repro.model.solving import solve
 from repro.model.surface import surface
 from repro.preflight.simplifications import warn_surface
 from repro.results import read_table
-from repro.runs.status import is_over
 from repro.scene import load_scene
 from tests.shell import read_record, state
-from verification.evidence.writing import append
 from verification.problems import family
 
 SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"', 'growth.end="6 h"',
@@ -192,16 +190,6 @@ def test_a_row_that_cannot_be_computed_is_left_out(failure, message):
     assert [report.pore.time for _, report in states if report] == [6.0]
 
 
-@pytest.mark.parametrize("status, over", [
-    ("the aggregate's surface folds in the step from t = 5.24 h: growth compressed it", True),
-    ("the aggregate's surface folds at t = 5.24 h: growth compressed it", True),
-    ("the aggregate's surface folds in the step from t = 5.24 h", False),
-    ("the aggregate's surface folds in the step from t = five h: near x = 1", False),
-    ("the aggregate's surface folds", False)])
-def test_the_status_of_a_fold_is_a_full_sentence(status, over):
-    assert is_over(status) == over
-
-
 @pytest.mark.parametrize("theta", [1.5, 3.0])
 def test_distances_on_a_surface_count_from_its_contact_lines(theta):
     """The plug has two free surfaces. The distance of an edge is that to the nearer end of its surface, over its
@@ -212,12 +200,3 @@ def test_distances_on_a_surface_count_from_its_contact_lines(theta):
         y = profile.middles[side, 1] / 20.0
         assert profile.distance[side] == pytest.approx(np.minimum(y, 1 - y), abs=1e-12)
     assert upstream.any() and (~upstream).any() and profile.place[1] in profile.middles[:, 1]
-
-
-def test_the_last_row_of_a_member_counts(monkeypatch, tmp_path):
-    """Rows are appended, so a member that runs again has several."""
-    record = tmp_path / "pores.jsonl"
-    monkeypatch.setattr(family, "RECORD", record)
-    for row in ({"number": 3, "verdict": "end"}, {"number": 1, "verdict": "end"}, {"number": 3, "verdict": "fold"}):
-        append(row, record)
-    assert family.read_record() == {1: {"number": 1, "verdict": "end"}, 3: {"number": 3, "verdict": "fold"}}

@@ -1,4 +1,5 @@
-"""Dual Monod kinetics (7)-(10): values against the paper's formulas, derivatives, bounds, and values below zero."""
+"""Dual Monod kinetics (7)-(10): values against the paper's formulas, derivatives, bounds, and values below zero.
+Haldane's law in a slab in which several states are steady at once; `reference/haldane_slab.py` has them."""
 from dataclasses import replace
 
 import numpy as np
@@ -7,14 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from reference import haldane_slab
 from repro import load_scene
-from repro.model import kinetics
+from repro.model import gear, kinetics, transport
 from repro.model.meshing import seeded
+from repro.model.uptake_law import LAWS, UptakeLaw
 from repro.model.uptake_law import LAWS as LAWS_OF_UPTAKE
-from repro.model.uptake_law import UptakeLaw
 from repro.scene import Substrates
 from tests import oracles
 from tests.strategies import between, concentrations, rate_constants, scenes
+from verification.problems import channels
 
 SCENES = scenes(drives=("none",))  # any constants
 amounts = concentrations | st.floats(-100.0, 0.0)
@@ -87,3 +90,56 @@ def test_every_law_of_uptake_satisfies_its_definition(substrate, name, scene, pa
     assert law_m.fraction(0.0) == 0 and law_m.slope(0.0) * half == pytest.approx(1.0, rel=1e-14)
     assert (law_m.slope(supplies) * half <= 1).all() and (law_m.fraction(supplies) <= law_m.largest(supplies[-1])).all()
     assert not law_m.saturates(0.5 * half)
+
+
+# ---------------------------------------------------------------- Haldane's law
+
+
+SUPPLY, HALF_SATURATION, INHIBITION = 30.0, 1.0, 1.0
+#: Uptake, mg/L/h.
+SINK = 1e6
+#: Error over the supply of quadratic elements of 4 um, beside the layer of little donor.
+MESH = 0.01
+#: Time (h) in which the slab settles: forty times l^2 / D.
+SETTLED = 0.02
+
+
+@pytest.fixture(scope="module")
+def slab():
+    """Space, problem and density of the biomass, which does not grow; and the reference's states at the nodes."""
+    donor = replace(channels.SCENE.substrates.donor, supply=SUPPLY, half_saturation=HALF_SATURATION,
+                    inhibition_constant=INHIBITION)
+    space = channels.slab_space(4.0, 0, 2, (-channels.SLAB, channels.SLAB), (-channels.SLAB, channels.SLAB))
+    kinetics = replace(channels.SCENE.kinetics, law="Haldane", yield_coefficient=1e-12, decay_coefficient=0.0)
+    problem = channels.problem(space, None, Substrates(donor=donor), kinetics)
+    solutions = haldane_slab.solutions(SUPPLY, SINK, HALF_SATURATION, INHIBITION, channels.SLAB,
+                                       donor.diffusivity_in_aggregate)
+    states = [solution(space.points[:, 0]) for solution in solutions]
+    assert len(states) == 3 and min(largest_gap(state, states[-1]) for state in states[:-1]) > 10 * MESH
+    return space, problem, SINK / kinetics.maximum_utilization_rate, states
+
+
+def largest_gap(one, other):
+    return np.abs(one - other).max() / SUPPLY
+
+
+@pytest.mark.parametrize("place", [0, -1])
+def test_the_transient_scheme_settles_to_the_same_state(slab, place):
+    """Gear's scheme, from the supply and from a start with little donor."""
+    space, problem, density, states = slab
+    supplied = transport.supplied_everywhere(problem)
+    start = transport.Concentrations(None, states[0] if place == 0 else supplied.donor)
+    active = channels.uniform_masses(space, density)
+    end = gear.advance(problem, active, 0 * active, start, SETTLED).concentrations
+    steady = channels.steady(problem, density, start if place == 0 else None)
+    assert largest_gap(end.donor, steady.donor) < 10 * gear.TOLERANCE
+    assert largest_gap(end.donor, states[place]) < MESH
+
+
+def test_only_haldanes_law_may_have_several_states():
+    """m of every law without the mark never decreases up to a large C."""
+    concentrations = np.linspace(0, 50, 501)
+    for name, law in LAWS.items():
+        constants = (1.0, 1.0) if name == "Haldane" else (1.0,)
+        rises = np.diff(law(*constants).fraction(concentrations)) >= 0
+        assert rises.all() == law.monotone

@@ -77,7 +77,7 @@ def test_a_longer_run_keeps_the_warning_about_its_surface(tmp_path, monkeypatch)
     assert [entry["text"] for entry in record["warnings"] if entry["key"] == "crease"] == ["from t = 0 h on"]
 
 
-@pytest.mark.parametrize("after", [1, 3])
+@pytest.mark.parametrize("after", [pytest.param(1, marks=pytest.mark.thorough), 3])
 def test_an_unfinished_run_is_made_longer(tmp_path, after):
     """The run stops before its last step or in it. A longer run that stops resumes as well."""
     complete, short = (scene("paper, an end within a step", end) for end in (None, 1.2))

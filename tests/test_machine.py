@@ -22,7 +22,6 @@ from repro.scene import SceneError, load_scene
 from tests import faults
 from tests.pages import run
 from tests.shell import SHORT, files, interrupt_run, read_record, refusal, run_and_wait, run_python
-from verification.bench import runs as bench_runs
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 
@@ -240,34 +239,6 @@ except SystemExit:
     pass
 print(*sys.modules, file=sys.stderr)
 """
-
-
-STAGES = """
-import json, sys
-import repro
-from repro import timing
-rows = repro.solve(json.loads(sys.argv[1]))
-print(json.dumps([[name for name, seconds in timing.seconds.items() if seconds > 0], [*rows], [*sys.modules]]))
-"""
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", bench_runs.SCENES)
-def test_a_scene_runs_and_imports_only_its_own_parts(name):
-    """The stages that run, and the columns that are filled, are those of the scene's sections. Without growth nothing
-    is moved or transferred. No scene imports more than the solver's packages."""
-    sections, needed = bench_runs.SCENES[name]
-    tables = bench_runs.scene_of("fast", {key: {**table, "end": "0.4 h"} if key == "growth" else table
-                                          for key, table in sections.items()})
-    stages, columns, modules = map(set, json.loads(run_python(STAGES, json.dumps(tables)).stdout))
-    grows = {"growth", "mesh motion"} if "growth" in tables else set()
-    assert stages - {"transfer", "factorise and solve"} == needed | grows | {"meshing"}
-    assert modules & (NEVER | SOLVER | FILES) <= SOLVER
-    filled = {word for word in ("acceptor", "donor", "conductivity", "aggregate")
-              if any(word in column for column in columns)}
-    substrates = tables.get("substrates")
-    modelled = set() if substrates is None else set(substrates) or {"acceptor", "donor"}
-    assert filled == modelled | ({"conductivity"} if "flow" in tables else set()) | ({"aggregate"} & set(tables))
 
 
 @pytest.mark.parametrize("arguments, needed", [

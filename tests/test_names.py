@@ -146,9 +146,9 @@ def without(*arguments, env):
     return subprocess.run(command, env=env, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("how", [["--resume", "{out}"],
-    pytest.param(["--resume", "{out}", "--set", "growth.end=3.1 h"], marks=pytest.mark.thorough),
-    pytest.param(["flow_only", "--out", "{out}", "--force"], marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("how", [["--resume", "{out}"], ["--resume", "{out}", "--set", "growth.end=3.1 h"],
+                                 ["flow_only", "--out", "{out}", "--force"]])
 def test_a_killed_run_without_flock_goes_on(tmp_path, without_flock, how):
     """The lock of a process that has ended does not count; no file of it and no warning remains."""
     out = tmp_path / "run"

@@ -137,21 +137,6 @@ def test_an_empty_pore_adds_nothing_and_thin_bodies_follow_half_discs():
     assert below == pytest.approx(above, rel=1e-7)
 
 
-def test_the_area_decides_the_contact():
-    """Without `spanned` the area decides whether a pore is spanned; near contact the bounds include both kinds."""
-    share = np.array([0.002, 0.5, 1.3, 1.45, 1.5, 1.52, 1.58, 1.61, 4.5])
-    by_area = np.array(repro.added_resistance(share, 1.0))
-    kinds = share > share_range(False)[1]
-    assert by_area[0] == pytest.approx(repro.added_resistance(share, 1.0, kinds).length, rel=1e-12)
-    either = (share >= CONTACT[0]) & (share <= CONTACT[1])
-    open_film = np.array(repro.added_resistance(np.minimum(share[either], share_range(False)[1]), 1.0, False))
-    plug = np.array(repro.added_resistance(share[either], 1.0, True))
-    assert by_area[1, either] == pytest.approx(open_film[1], rel=1e-12)
-    assert by_area[2, either] == pytest.approx(plug[2], rel=1e-12)
-    alone = np.array(repro.added_resistance(share[~either], 1.0, kinds[~either]))
-    assert by_area[:, ~either] == pytest.approx(alone, rel=1e-12)
-
-
 @pytest.mark.parametrize("contact_is_given", [False, True])
 def test_shapes_near_contact_are_within_the_bounds(contact_is_given):
     """These are shapes of the fit and shapes that it does not include, with contact and without it."""
@@ -210,23 +195,6 @@ def test_the_uptake_at_a_zero_is_the_limit(zeros, area):
     assert np.array(near[0]) == pytest.approx(np.array(near[1]), rel=2.0**-12, abs=largest.max())
     assert near[0].bound == pytest.approx(near[1].bound, rel=1e-6) and near[0].bound >= UPTAKE_BOUND
     assert (near[0].acceptor > 0) == (zeros == (3,))
-
-
-@pytest.mark.parametrize("acceptor", [1e-6, 8.0])
-@pytest.mark.parametrize("donor", [1e-9, 0.01, 5.0])
-def test_a_small_aggregate_takes_up_at_the_rates_of_the_supply(acceptor, donor):
-    """(7)-(10) in closed form. The inner bisection errs by 2^-13 of the demand of decay."""
-    kinetics = repro.load_scene("base").kinetics
-    area = np.array([1e-2, 1e-4, 1e-8, 1e-16, 1e-60])
-    m_a, m_d = acceptor / (acceptor + 1), donor / (donor + 1)
-    rate = kinetics.maximum_utilization_rate * m_a * m_d
-    decay = kinetics.decay_coefficient * m_a
-    demand = 1.52 * rate + kinetics.decay_oxygen_demand * kinetics.degradable_fraction * decay
-    taken = repro.uptake(area, 50.0, 1.0, acceptor, donor)
-    close = {"rel": 2.0**-12 + 1e-2 * (area > 1e-3)}
-    density = kinetics.maximum_density
-    for values, expected in ((taken.donor, rate), (taken.acceptor, demand)):
-        assert (np.abs(values / (density * area * expected) - 1) < close["rel"]).all()
 
 
 @pytest.mark.parametrize("values, message", [

@@ -105,18 +105,15 @@ def test_a_table_that_cannot_be_kept_is_used_with_a_warning(tmp_path, solutions)
     (["flow.permeability=1e-15 m^2"], "one viscous aggregate between two walls"),
     (['pore.upper_wall="symmetry"'], "one viscous aggregate between two walls"),
     (['kinetics.law="Haldane"'], "an uptake that rises"), (['kinetics.law="zero order"'], "no front"),
-    (['kinetics.decay="unlimited"'], "no decay without acceptor")])
-def test_a_scene_of_another_form_is_refused(changes, need):
-    with pytest.raises(repro.SceneError, match=f"scene: the laws for networks need .*{need}"):
-        repro.uptake(1000.0, 60.0, 1.0, scene=repro.load_scene(SCENE, changes))
-
-
-@pytest.mark.parametrize("missing, need", [("flow", "a flow"), ("substrates.donor", "both"),
-                                           ("aggregate", "one viscous")])
-def test_a_scene_without_a_part_is_refused(missing, need):
-    unset = [missing, *(["kinetics"] if missing == "aggregate" else [])]
-    with pytest.raises(repro.SceneError, match=f"the laws for networks need .*{need}"):
-        repro.added_resistance(1000.0, 60.0, scene=repro.load_scene(SCENE, unset=unset))
+    (['kinetics.decay="unlimited"'], "no decay without acceptor"), (["--unset flow"], "a flow"),
+    (["--unset substrates.donor"], "both"), (["--unset aggregate", "--unset kinetics"], "one viscous")])
+def test_a_scene_of_another_form_or_without_a_part_is_refused(changes, need):
+    unset = [change.removeprefix("--unset ") for change in changes if change.startswith("--unset ")]
+    scene = repro.load_scene(SCENE, () if unset else changes, unset=unset)
+    for law in (lambda: repro.uptake(1000.0, 60.0, 1.0, scene=scene),
+                lambda: repro.added_resistance(1000.0, 60.0, scene=scene)):
+        with pytest.raises(repro.SceneError, match=f"scene: the laws for networks need .*{need}"):
+            law()
 
 
 def test_the_resistance_follows_grown_shapes():

@@ -80,7 +80,7 @@ def scene(points, preset="fast"):
         "growth": {"end": "0.2 h"}, "numerics": {"preset": preset}}, "odd", "odd.toml")
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 8))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(1, 8))])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_hostile_outline_has_a_first_row_or_is_refused_by_its_scene(family, seed):
     """The refusal is one line with the requirement. The number of nodes is within a factor of two of the estimate, and

@@ -2,7 +2,6 @@
 
 The case hard-family judges the files of runs with one substrate, and `test_longer.py` makes one of them longer.
 """
-from time import process_time
 
 import numpy as np
 import pytest
@@ -10,12 +9,8 @@ import pytest
 from repro import results
 from repro.march.balance import LARGEST, Limits, accepted_demand, oxygen_demand
 from repro.march.simulation import simulate
-from repro.model import solving, transport
-from repro.model.kinetics import Sink
-from repro.model.meshing import seeded
 from repro.preflight.modelled import describe_model
 from repro.scene import load_scene
-from repro.schemes import CURVED
 
 SCHEMES = {"midpoint": ["numerics.preset=fast", 'growth.end="2 h"', 'output.times=["0 h", "2 h"]'],
            "updates": ["numerics.preset=paper", "numerics.refinement=0.5", 'growth.end="1 h"'],
@@ -85,25 +80,3 @@ def test_check_states_what_is_assumed():
               "its oxygen demand is not met": "kinetics"}
     assert all(text in changed[section] and text not in paper[section] for text, section in stated.items())
     assert "none without acceptor" in paper["kinetics"]
-
-
-@pytest.mark.thorough  # a ratio of times, which other work on the machine disturbs
-@pytest.mark.parametrize("name", OTHER)
-def test_a_solution_of_one_substrate_costs_at_most_0_6_of_two(name):
-    """Processor time of assembly and solution at more than 2500 nodes, the least of five, in turns."""
-    both = load_scene("base", ["aggregate.radius=20 um", "numerics.preset=accurate", "numerics.refinement=0.85"],
-                      unset=["growth"])
-    one = load_scene(both, unset=[f"substrates.{OTHER[name]}"])
-    seed = seeded(both)
-    carried = solving.solve(both, seed).flow
-    assert seed.space.count > 2500
-
-    def seconds(scene):
-        start = process_time()
-        equations = transport.problem(seed.space, carried, scene.substrates, scene.kinetics, CURVED)
-        transport.fluxes(equations, Sink(seed.active), transport.steady(equations, Sink(seed.active)))
-        return process_time() - start
-
-    times = np.array([[seconds(scene) for scene in (one, both)] for _ in range(6)][1:])
-    least = times.min(axis=0)
-    assert least[0] <= 0.6 * least[1], least

@@ -44,12 +44,3 @@ def test_viscosity_and_drag_dissipate_the_work_of_the_head(body, interface):
         dissipated += np.einsum("tq,itq,itq->", space.at.dx[state.mesh.biomass], speed, speed) / 40.0
     work = scene.flow.gravity * stream.meshed_loss * stream.mean_velocity * scene.pore.width
     assert work == pytest.approx(scene.flow.kinematic_viscosity * dissipated, rel=1e-9)
-
-
-@INTERFACES
-def test_a_permeable_body_lies_between_open_water_and_a_wall(interface):
-    """The tighter the body, the less the pore conducts."""
-    conductivity = [solved(f"flow.permeability={permeability} um^2", interface)[2].flow.conductivity
-                    for permeability in (1e12, 1e3, 40.0, 1.0)]
-    clean = load_scene("base").flow.gravity * 50.0**2 / 12 / load_scene("base").flow.kinematic_viscosity
-    assert conductivity[0] == pytest.approx(clean, rel=1e-6) and (np.diff(conductivity) < -1e-3 * clean).all()

@@ -7,22 +7,11 @@ import pytest
 
 from repro.fem import sizing
 from repro.fem.walls import TOP
-from repro.march import midpoint, simulation
-from repro.model import remeshing
-from repro.model.biomass import Rates
-from repro.model.mechanics import Expansion
-from repro.model.meshing import seeded
+from repro.march import simulation
 from repro.scene import PRESETS, Numerics, parse_scene
-from tests.strategies import ORDERS, scene
+from tests.strategies import scene
 from tests.test_scene import EVERYTHING
-from verification.problems.aggregates import reaction_points
-from verification.problems.schemes import exchange, load_scene
-
-
-def base(*changes, order=2):
-    """Base with elements of an order, of the size of preset fast."""
-    refinement = f"numerics.refinement={0.5 if order == 1 else 0.2}"
-    return load_scene("base", ("numerics.preset=fast", exchange(elements=ORDERS[order]), refinement, *changes))
+from verification.problems.schemes import load_scene
 
 
 @pytest.mark.parametrize("count", [pytest.param(0.0, marks=pytest.mark.thorough), 8.0])
@@ -39,25 +28,6 @@ def test_elements_beside_contact_lines_are_as_small_as_requested(count):
     assert len(beside) == 2
     sizes = outline.edge_lengths()[beside]
     assert (sizes <= sizing.SPLIT * 1.35 * (film / 8 + sizing.GRADATION * sizes)).all() == (count == 8)
-
-
-@pytest.mark.parametrize("straight", [True, False])
-@pytest.mark.parametrize("order", ORDERS)
-def test_rates_are_carried_back_from_a_new_mesh(order, straight):
-    """Rates that are linear in the coordinates half way return to the material's points exactly if edges are straight.
-    Along bent edges the error is at most 1 % of the range (measured 0.5 %), since a function that is linear within a
-    triangle is not linear in the coordinates. Constant rates stay constant."""
-    scene_of_order = base('aggregate.radius="20 um"', order=order)
-    start = seeded(scene_of_order)
-    points = start.mesh.with_middles(start.mesh.points[: start.mesh.corners]) if straight else start.mesh.points
-    half = start.moved(points * [1.1, 1.1])
-    remeshed, _ = remeshing.remesh(remeshing.Remeshing.of(scene_of_order), start, half, 0.0)
-    (x, y), (u, v) = reaction_points(remeshed.space), reaction_points(half.space)
-    accepted = 1e-6 if straight or order == 1 else 0.01 * 88
-    for rates, expected, bound in ((Rates(2 * x + y, 3 - y), (2 * u + v, 3 - v), accepted),
-                                 (Rates(0 * x + 1, 0 * x + 2), (1, 2), 1e-12)):
-        back = midpoint._carry_rates_back(remeshed, start, Expansion(half, 0, 0.0), rates)
-        assert max(np.abs(back.growth - expected[0]).max(), np.abs(back.remains - expected[1]).max()) < bound
 
 
 def numerics(**changes):

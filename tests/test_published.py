@@ -165,6 +165,7 @@ def test_every_block_is_of_a_kind_that_is_executed():
     assert len(readme.encode()) < 8_500 and readme.index("overview.png") < readme.index("make env") < 2_500
 
 
+@pytest.mark.thorough
 def test_the_examples_of_the_readme_run(tmp_path, capsys, monkeypatch):
     """Its commands run in their order in one folder; its scene is base; its Python runs."""
     monkeypatch.chdir(tmp_path)
@@ -204,6 +205,7 @@ def test_the_examples_of_the_tutorial_run(tmp_path, capsys, monkeypatch):
     assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]
 
 
+@pytest.mark.thorough
 def test_the_examples_of_the_how_to_pages_run(tmp_path, capsys, monkeypatch):
     """With a run of base to 1 h as runs/mine. test_sweep_cluster has clusters; PyVista reads and does not draw."""
     monkeypatch.chdir(tmp_path)

@@ -2,10 +2,8 @@
 
 import inspect
 import io
-import pydoc
 from contextlib import redirect_stderr
 from functools import partial
-from typing import get_type_hints
 
 import numpy as np
 import pint
@@ -15,7 +13,6 @@ import repro
 from repro.cli import main
 from repro.errors import OutputError
 from repro.scene import SceneError
-from repro.scene.arguments import Overrides
 from tests import faults
 from tests.strategies import same_arrays
 
@@ -82,11 +79,6 @@ def test_numbers_and_arrays_of_numpy_are_accepted():
     assert repro.load_scene("base", unset=("flow.head",), overrides=("flow.mean_velocity=1 m/day",)).flow.head is None
     outline = np.array([[-5.0, 0], [0, 5], [5, 0]])
     assert next(repro.simulate("base", SHORT, shape=outline, unset=[])).pore.outline.thickness == pytest.approx(5)
-
-
-def test_every_function_takes_a_dict_of_overrides():
-    hints = {name: get_type_hints(getattr(repro, name)) for name in ORDER}
-    assert all(each["overrides"] == Overrides for each in hints.values() if "overrides" in each)
 
 
 class Stand:
@@ -166,19 +158,3 @@ def test_a_bar_is_shown_if_it_is_asked_for(call, reached, tmp_path, monkeypatch)
     with redirect_stderr(io.StringIO()) as shown:
         call(tmp_path)
     assert shown.getvalue() == ""
-
-
-def test_runs_are_compared_from_python(tmp_path):
-    folders = [repro.run("flow_only", tmp_path / width, [f"pore.width={width} um"]).folder for width in ("40", "50")]
-    page = repro.compare(folders, str(tmp_path / "both.html"))
-    assert page == tmp_path / "both.html" and "pore.width" in page.read_text(encoding="utf-8")
-    with pytest.raises(OutputError, match="two runs or more"):
-        repro.compare(folders[:1], page)
-
-
-def test_help_shows_functions_before_errors_and_no_address():
-    text = pydoc.render_doc(repro, renderer=pydoc.plaintext)
-    names = {name for name in repro.__all__ if not isinstance(getattr(repro, name), type)}
-    errors = [name for name in dir(repro) if name not in repro.__all__]
-    assert all(0 < text.find(f"    {name}(") < text.find("Errors:") for name in names) and " at 0x" not in text
-    assert errors and all(text.find("Errors:") < text.find(name) for name in errors) and "class OutputError" not in text

@@ -58,7 +58,7 @@ def test_a_spiked_outline_is_the_same_in_every_preset():
     assert losses["accurate"] == pytest.approx(losses["exact"], rel=0.002)
 
 
-@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(4, 8))])
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 8))])
 def test_presets_agree_on_a_ragged_outline_or_a_warning_names_what_resolves_it(seed):
     width, points = ragged(seed)
     fast = scene(width, points)

@@ -56,7 +56,7 @@ def test_the_gap_is_as_large_as_required_everywhere_and_no_larger_at_one_place(t
         assert spare.min() == pytest.approx(0.0, abs=1e-4)
 
 
-@pytest.mark.parametrize("theta", [even, uneven])
+@pytest.mark.parametrize("theta", [pytest.param(even, marks=pytest.mark.thorough), uneven])
 def test_the_area_is_that_of_the_growth(theta):
     equilibrium = touching(theta).equilibrium
     _, (x, y) = contact_growth.outline(equilibrium)

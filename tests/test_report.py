@@ -397,27 +397,8 @@ def test_a_value_that_is_not_finite_has_no_level():
     assert (low, high, decode_numbers(text, "<u2").tolist()) == (1.0, 3.0, [0, 65535, 65534, 65535])
 
 
-def test_stages_are_shown_as_parts_of_the_time_longest_first():
-    """Stages without any time are left out."""
-    bars = run_page._bars({"flow": 1.0, "none": 0.0, "growth": 3.0}, 6.0)
-    labels = re.findall('<text x="0".*?>(.*?)<.*? width="(.*?)".*?>([0-9.]+) s<', bars)
-    assert labels == [("growth", "75.0", "3"), ("flow", "25.0", "1")]
-
-
 @pytest.mark.parametrize("value, displayed", [(0.00123457, "0.00123457"), (True, "yes"), (False, "no"), (None, "none"),
                                          ("1234.56789 um", "1234.57 um"), ("a b", "a b"), ([], "none"),
                                          ([1.5, "2.0 h"], "1.5, 2 h")])
 def test_a_value_is_shown_with_six_digits_and_its_unit(value, displayed):
     assert run_page.page.format_value(value) == displayed
-
-
-def test_fields_of_the_aggregate_alone_are_those_without_values_in_the_fluid(fast):
-    """In the file of a run these fields are NaN at every node or triangle of the fluid, except biomass, which is zero.
-    """
-    grid = field_files.read(fields.index(fast)[-1][1])
-    region = grid.cell_data["region"] > 0.5
-    outside = np.setdiff1d(np.arange(len(grid.points)), grid.cells[region])
-    absent = {name for name, values in grid.point_data.items() if np.isnan(values[outside]).all()}
-    absent |= {name for name, values in grid.cell_data.items() if np.isnan(values[~region]).all()}
-    shown = set(fields.FIELDS) & {*grid.point_data, *grid.cell_data}
-    assert len(absent) > 5 and fields.OF_AGGREGATE & shown == absent & shown | {"active_biomass", "inert_biomass"}

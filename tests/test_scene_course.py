@@ -17,7 +17,6 @@ from repro.march.state import Report
 from repro.model import solving
 from repro.model.meshing import seeded
 from repro.preflight.checked import check
-from repro.preflight.modelled import describe_model
 from repro.preflight.numbers import evaluate_at_largest
 from repro.results.jumps import with_jumps
 from repro.results.names import DEFECTS
@@ -96,14 +95,6 @@ def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(key):
     drawn = {column for column in rows[0] if len(with_jumps(column, times, values, scene_tables(loaded))[0]) > 2}
     assert changed - {"time_h", *DEFECTS} - drawn == set(), "these jump"
     assert {column for column in drawn - changed if rows[0][column] or rows[1][column]} == set(), "these do not"
-
-
-@pytest.mark.parametrize("key", TIMED)
-def test_check_describes_every_table(key):
-    without, beside = DRIVEN_BY.get(key, ([], []))
-    table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 1e4), ("2 h", 3e4))])
-    described = dict(describe_model(load_scene("base", [f"{key}={table}", *beside], unset=without)))
-    assert ", in steps, the last from 2 h" in described[key.partition(".")[0]]
 
 
 def test_the_times_of_all_tables_of_a_scene_are_its_corners():

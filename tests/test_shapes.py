@@ -13,17 +13,13 @@ from repro.cli import main
 from repro.results import COLUMNS, drawing
 from tests import faults
 
+pytestmark = pytest.mark.usefixtures("close_figures")
+
 SHORT = {"numerics.preset": "fast", "growth.end": "0.4 h", "output.every": "0.2 h"}
 CLEAN = {"pore": {"width": "50 um"}, "flow": {"head": "1 mm"}}
 TWO = {"pore": {"width": "50 um"}, "flow": {"mean_velocity": "2 m/day"}, "numerics": {"extent": "full"},
        "aggregate": [{"radius": "6 um", "position": "-30 um", "name": "first"},
                      {"radius": "9 um", "position": "20 um", "wall": "upper"}]}
-
-
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module", params=["fast", "paper"])

@@ -1,7 +1,7 @@
-"""A sweep as its user sees it: runs, tables, page, refusals, resumes and killed runs."""
-
+"""A sweep as its user sees it: runs, tables, page, refusals, resumes, killed runs and times of clogging."""
 import html
 import json
+import math
 import os
 import re
 import shutil
@@ -182,20 +182,6 @@ def test_the_page_needs_no_network_and_escapes_its_texts(finished):
     assert "<script" not in escaped and "<img" not in escaped and escaped.count(html.escape(HOSTILE)) == 3
 
 
-def test_the_table_of_the_page_agrees_with_the_runs(finished):
-    """It has the varied keys with units, numbers to four digits, and the status in a word."""
-    head, *lines = re.findall("<tr>(.*?)</tr>", (finished / "summary.html").read_text())
-    names = re.findall("<th.*?>(.*?)</th>", head)
-    for line, run in zip(lines, rows(finished / "runs.csv"), strict=True):
-        cells = dict(zip(names, (re.sub("<.*?>", "", cell) for cell in re.findall("<td.*?</td>", line)), strict=True))
-        end, wall = (run[column] and f"{float(run[column]):.4g}" for column in ("end_h", "wall_time_s"))
-        expected = {"run": run["run"], "flow.mean_velocity": f"{run['flow.mean_velocity_m_per_d']} m/day",
-                  "end (h)": end, "wall time (s)": wall,
-                  "conductivity (m/day)": run["conductivity_m_per_d"] and f"{float(run['conductivity_m_per_d']):.4g}",
-                  "status": run["status"].partition(":")[0]}
-        assert {name: cells[name] for name in expected} == expected and "contact (h)" not in cells
-
-
 def test_rows_have_the_inputs_of_their_runs(tmp_path, monkeypatch):
     """With two factors of other sizes and units, both tables have each run's inputs and its velocity."""
     monkeypatch.setattr(driver, "ready", in_this_process)
@@ -280,6 +266,7 @@ def two_points():
     return make_points("pore.width=48 um, 50 um", source="flow_only")
 
 
+@pytest.mark.thorough
 def test_a_process_killed_between_runs_costs_none(tmp_path):
     """Another process makes the next run."""
     with closing(pool.Processes()) as processes:
@@ -567,3 +554,24 @@ def test_lines_are_visible_on_light_and_dark_pages():
         values = np.array([luminance(colour) for colour in re.findall("stroke: (#.{6})", rules)])
         lower, upper = np.sort([values, np.full(page.LEVELS, luminance(background))], axis=0)
         assert (np.diff(values) > 0).all() and ((upper + 0.05) / (lower + 0.05)).min() > 2.5
+
+
+# ---------------------------------------------------------------- times of clogging
+
+
+#: K / K_0 = exp(-t / 3).
+TIMES = np.array([0.0, 0.7, 2.0, 5.0, 9.0, 20.0])
+FALLING = np.exp(-TIMES / 3)
+
+
+@pytest.mark.parametrize("times, relative, part, expected", [
+    *((TIMES, FALLING, part, -3 * math.log(part)) for part in (0.5, 0.1, 0.013)), (TIMES, FALLING, 1e-3, math.nan),
+    (np.arange(4.0), [1, 0.25, 1, 0.25], 0.5, 0.5),
+    (np.arange(6.0), [1.0, 1.4, 1.2, 0.9, 0.45, 0.2], 0.5, 3 + math.log(0.9 / 0.5) / math.log(2)),
+    (np.arange(6.0), [1.0, 0.8, 1.5, 0.75, 0.375, 3.0], 0.5, 3 + math.log(0.75 / 0.5) / math.log(2)),
+    (np.arange(3.0), [1.0, 2.0, 3.0], 0.5, math.nan)])
+def test_the_clogging_time_of_an_exponential_fall_is_exact(times, relative, part, expected):
+    """For any rows it is the first time at which a part of the initial conductivity, not of the largest, is left. The
+    biomass is 1 + t / 10."""
+    computed = table.clogging(times, np.array(relative, float), 1 + times / 10, part)
+    assert computed == pytest.approx((expected, 1 + expected / 10), rel=1e-12, nan_ok=True)

@@ -107,6 +107,8 @@ def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
     assert point.scene.flow.mean_velocity == pytest.approx(2e6 / 24, rel=1e-15)
     (point,) = make_points("flow.head=1 um", source="wide")
     assert point.scene.flow.mean_velocity is None and point.scene.flow.head == 1
+    (point,) = make_points("flow.rate=3 uL/day", sets=["pore.depth=20 um"])
+    assert (point.scene.flow.head, point.scene.flow.rate) == (None, pytest.approx(3e9 / 24))
 
 
 @pytest.mark.parametrize("varied, sets, part", [
@@ -116,7 +118,8 @@ def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
     (["numerics.preset=fast, best"], [], "run 2 .*preset"),
     (["pore.width=50 um, 50.0 um"], [], "run 2 .*same scene as run 1"),
     (["pore.width=50 um", "pore.width=60 um"], [], "one vary"),
-    (["flow.head=1 um", "flow.mean_velocity=1 m/day"], [], "exclude each other"),
+    *((["flow.head=1 um", f"flow.{drive}"], [], "exclude each other")
+      for drive in ("mean_velocity=1 m/day", "rate=3 uL/day")),
     (["flow.head=1 um"], ['flow.head="2 um"'], "overrides of flow.head"),
     (["flow.head=1 um"], ['flow.mean_velocity="2 m/day"'], "overrides of flow.head or flow.mean_velocity"),
 ])

@@ -1,5 +1,5 @@
 """The verification can fail: verdicts follow from numbers, orders have bounds on both sides, and records and pages are
-merged from all workers of a session."""
+merged from all workers of a session. A part of a hard case that stops with an error is refused only with a reason."""
 import json
 import math
 import os
@@ -7,16 +7,20 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from repro.errors import SimulationError, TransportError
 from repro.scene.keys import PRESETS
 from verification.evidence import cases, matrix, pages, writing
 from verification.evidence.cases import STAGES
 from verification.evidence.checks import at_least, at_most, between, study
 from verification.mutants import runner
+from verification.problems import hard
+from verification.problems.hard import REFUSED, WRONG
 
 SIZES = 0.5 ** np.arange(4)
 
@@ -96,6 +100,7 @@ def test_made_empty(record):
 '''
 
 
+@pytest.mark.thorough
 def test_a_parallel_session_records_all_its_cases():
     """A copy of the project has four more cases: one passes, one fails in a variant, a floating-point error stops a
     variant of the third, and the last measures nothing. The registry has the variants that pytest runs."""
@@ -120,3 +125,17 @@ def test_a_parallel_session_records_all_its_cases():
     assert new_records["flow-made-stopped"]["errors"][0].startswith("0: FloatingPointError")
     assert "| q, three (5) | at most 4 | theory | NO |" in page and "Stopped by an error: 0: FloatingPointError" in page
     assert measured["cases"]["flow-made-good"]["measured"]["r, v = 3"] == "2"
+
+
+# ---------------------------------------------------------------- hard cases
+
+
+@pytest.mark.parametrize("error, verdict, excerpt", [
+    (SimulationError("try another"), REFUSED, "try another"),
+    (TransportError("the Peclet number is 1e-12, under 1e-9"), REFUSED, "under 1e-9"),
+    (SimulationError("stopped"), WRONG, "without a reason: stopped"), (ValueError("try again"), WRONG, "ValueError"),
+    ([[]], WRONG, "nothing was measured")])
+def test_an_error_refuses_a_part_only_with_a_reason(error, verdict, excerpt):
+    """A part that measures nothing is wrong, too."""
+    part = hard.run_part("a part", Mock(side_effect=error), "fast")
+    assert part.verdict == verdict and excerpt in part.message

@@ -9,7 +9,7 @@ from repro.fem import mesher, sizing
 from repro.fem.outline import half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import BOTTOM, FREE, TOP, Seat, channel_walls, whole_width
+from repro.fem.walls import BOTTOM, FREE, TOP, Seat, channel_walls
 from repro.model import adhesion, contact, flow, meshing
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import Clearance, surface_ends
@@ -27,15 +27,6 @@ def with_wall(at, number, **fields):
     """A pore in which one of the walls has other fields."""
     walls = tuple(replace(wall, **fields) if wall.number == number else wall for wall in at.mesh.walls)
     return replace(at, space=Space(replace(at.mesh, walls=walls)))
-
-
-@WALLS
-def test_a_wall_measures_gaps_into_the_pore(on):
-    """Both walls have the gap zero at themselves, and W at the opposite wall."""
-    points = np.array([[3.0, 0.0], [3.0, 0.25 * WIDTH], [3.0, WIDTH]])
-    expected = np.array([0.0, 0.25, 1.0]) * WIDTH
-    assert on.gap(points if on.y == 0 else points * [1, -1] + [0, WIDTH]) == pytest.approx(expected)
-    assert on.holds(points).tolist() == [on.y == 0, False, on.y == WIDTH]
 
 
 @WALLS
@@ -131,16 +122,6 @@ def test_a_new_surface_keeps_a_point_unless_its_wall_keeps_none(number):
 
 
 PRESETS = {1: "paper", 2: "fast"}
-SYMMETRY = channel_walls(WIDTH, upper="symmetry")
-
-
-def test_a_plane_of_symmetry_is_the_middle_of_a_pore_of_twice_the_width():
-    """Its film reaches the mirror image, its gap does not. The other wall has neither."""
-    points = np.array([[0.0, 0.8 * WIDTH]])
-    lower, plane = SYMMETRY
-    assert whole_width(SYMMETRY) == 2 * WIDTH and whole_width(channel_walls(WIDTH)) == WIDTH
-    assert plane.gap(points) == pytest.approx(0.2 * WIDTH) and plane.film(points) == pytest.approx(0.4 * WIDTH)
-    assert lower.film(points) == lower.gap(points)
 
 
 @EVERY_ORDER

@@ -343,7 +343,7 @@ CURVED, BOW = 0.5, 1e-5
 
 @pytest.mark.case(
     "flow-first-rise", kind="exact", mutants=("viscosity-swapped", "loss-per-width"), references=("poiseuille",))
-@parametrize("order, interface", combined(ORDERS, FORMS))
+@parametrize("order, interface", combined(ORDERS, FORMS), slow=("traction",))
 def test_first_rise(order, interface, record):
     """At lambda = 1 the derivative of the head loss by lambda is the dissipation of Poiseuille flow in a half-disc: to
     second order with linear elements, and on a coarse mesh with quadratic ones.
@@ -463,7 +463,7 @@ def manufactured(setup: tuple, ratio: float, interface: str):
 @pytest.mark.case(
     "flow-manufactured", kind="manufactured", mutants=("saddle-sign",), references=("manufactured_flow",),
     omitted="order 2: flow-manufactured-quadratic")
-@parametrize("*setup", combined(SETUPS, SOFT_AND_STIFF, FORMS), slow=viscous(RATIO))
+@parametrize("*setup", combined(SETUPS, SOFT_AND_STIFF, FORMS), slow=("traction", *viscous(RATIO)))
 def test_manufactured(setup, record):
     """If only the viscosity jumps, all orders are full, for lambda = 10 and 2000 in both forms.
 

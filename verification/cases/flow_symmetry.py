@@ -39,7 +39,7 @@ def below(grid: Mesh) -> Mesh:
 @pytest.mark.case(
     "flow-symmetry-poiseuille", kind="exact", references=("poiseuille",),
     mutants=("plane-is-a-wall", "inlet-without-the-mirror-image", "unmeshed-without-the-mirror-image"))
-@parametrize("order, interface", combined(flow_cases.ORDERS, FORMS))
+@parametrize("order, interface", combined(flow_cases.ORDERS, FORMS), slow=("traction",))
 def test_poiseuille(order, interface, record):
     """Below a plane of symmetry a clean channel has half of Poiseuille's parabola between walls twice as far apart,
     its loss, and the conductivity of that pore.

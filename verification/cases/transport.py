@@ -397,7 +397,7 @@ def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple
     mutants=("cross-flow-sign", "exchanged-half-saturation", "fluid-diffusivity", "ratio-on-the-donor-only",
              "quarter-of-a-triangle"), references=("manufactured_transport",),
     omitted="order 2: transport-manufactured-higher")
-@parametrize("*setup", _variants(1))
+@parametrize("*setup", _variants(1), slow=("pore's Pe = 0.1",))
 def test_manufactured(setup, record):
     """The full equations reproduce manufactured concentrations around a half-disc with second order, at Peclet numbers
     of the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition.

@@ -2,7 +2,7 @@
 
 from verification.mutants import changes
 
-GRADIENTS = "tests/test_space.py::test_products_of_two_gradients_are_integrated"
+GRADIENTS = "tests/test_mesh.py::test_products_of_two_gradients_are_integrated"
 PERMEABLE = "tests/test_flow.py::"
 
 MUTANTS = (
@@ -210,13 +210,13 @@ MUTANTS = (
          "",
          "DEGREES = {1: 2, 2: 6}",
          "DEGREES = {1: 2, 2: 2}",
-         "tests/test_space.py::test_products_of_two_functions_are_integrated_exactly[straight sides]"),
+         "tests/test_mesh.py::test_products_of_two_functions_are_integrated_exactly[straight sides]"),
         ("quadrature-of-straight-triangles",
          "Products of quadratic functions are integrated beside arcs as on straight triangles.",
          "",
          "DEGREES = {1: 2, 2: 6}",
          "DEGREES = {1: 2, 2: 4}",
-         "tests/test_space.py::test_products_of_two_functions_are_integrated_exactly[made]")),
+         "tests/test_mesh.py::test_products_of_two_functions_are_integrated_exactly[made]")),
     *changes(
         "repro/fem/space.py",
         ("gradients-of-degree-2",

@@ -26,12 +26,12 @@ GEAR = "tests/test_gear.py::test_"
 COURSE = "tests/test_scene_course.py::test_"
 MIRRORS = "tests/test_mirrors.py::test_"
 PAIRS = "tests/test_option_pairs.py::test_"
-GUARDS = "tests/test_guards.py::test_"
+GUARDS = "tests/test_balances.py::test_"
 SENSITIVITY = "tests/test_sensitivity.py::test_"
-UNCERTAINTY = "tests/test_uncertainty.py::test_"
+UNCERTAINTY = "tests/test_sensitivity.py::test_"
 NEW_MESH = "tests/test_new_mesh_due.py::test_"
 CACHE_KEYS = "tests/test_cache_keys.py::test_"
-DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_front_needs"
+DEEPEST = "tests/test_transport.py::test_elements_are_halved_as_often_as_a_front_needs"
 DOMAINS = "tests/test_domains.py::test_"
 SIZING = "tests/test_sizing.py::test_"
 FOLD = "tests/test_fold.py::test_"
@@ -291,7 +291,7 @@ MUTANTS = (
          "",
          "at.remeshes > 0 or at.new_mesh",
          "at.remeshes == 1 or at.new_mesh",
-         "tests/test_guards.py::test_counts_in_the_record_include_every_step"),
+         "tests/test_balances.py::test_counts_in_the_record_include_every_step"),
         ("thickness-of-the-nodes",
          "The thickness is that of the nodes and ignores the arcs between them.",
          "",
@@ -427,7 +427,7 @@ MUTANTS = (
          "clogging",
          "np.log(relative[i - 1] / threshold) / np.log(relative[i - 1] / relative[i])",
          "(relative[i - 1] - threshold) / (relative[i - 1] - relative[i])",
-         "tests/test_shrinking.py::test_the_clogging_time_of_an_exponential_fall_is_exact"),
+         "tests/test_sweep.py::test_the_clogging_time_of_an_exponential_fall_is_exact"),
         ("contact-in-the-last-row",
          "The reported contact is that of the last row in contact.",
          "RunSeries.at_contact",
@@ -802,8 +802,7 @@ MUTANTS = (
          "",
          "f\"the aggregate's surface folds (?:at|in the step from) {TIME}: growth .*\"",
          "f\"the aggregate's surface folds (?:at|in the step from) {TIME}.*\"",
-         f"{FOLD}the_status_of_a_fold_is_a_full_sentence"
-         "[the aggregate's surface folds in the step from t = 5.24 h-False]")),
+         "tests/test_sweep.py::test_every_status_takes_its_whole_path_through_a_sweep")),
     *changes(
         "repro/runs/history.py",
         ("fields-that-changed",
@@ -844,13 +843,13 @@ MUTANTS = (
          "names = {name for name in listed\n"
          "         if name in (*RUN_FILES, *FORMER_FILES) or FIELDS.fullmatch(name)}",
          "names = {name for name in listed if name}",
-         "tests/test_run_again.py::test_a_forced_run_removes_only_the_listed_files"),
+         "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files"),
         ("former-files-stay",
          "The NetCDF file of a run of an earlier version stays beside the run that replaces it.",
          "list_written_files",
          "name in (*RUN_FILES, *FORMER_FILES)",
          "name in RUN_FILES",
-         "tests/test_run_again.py::test_a_forced_run_removes_only_the_listed_files")),
+         "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files")),
     *changes(
         "repro/runs/execution.py",
         ("another-scene-goes-on",
@@ -858,7 +857,7 @@ MUTANTS = (
          "_refuse_another",
          '("source", "versions") if previous["hash"] == current["hash"] else ("tables",)',
          '("source", "versions") if previous["hash"] == current["hash"] else ("source",)',
-         "tests/test_run_again.py::test_another_scene_is_refused_with_its_differences"),
+         "tests/test_resume.py::test_another_scene_is_refused_with_its_differences"),
         ("earlier-end-taken",
          "A run may be made shorter.",
          "_extended_scene",
@@ -1599,7 +1598,7 @@ MUTANTS = (
          "clogging",
          "low = np.flatnonzero(relative <= threshold)",
          "low = np.flatnonzero((relative <= threshold) & (np.append(1.0, relative[:-1]) > threshold))[-1:]",
-         "tests/test_shrinking.py::test_the_clogging_time_of_an_exponential_fall_is_exact"),
+         "tests/test_sweep.py::test_the_clogging_time_of_an_exponential_fall_is_exact"),
         ("not-relative",
          "The relative conductivity is not divided by the first one.",
          "_read_run",
@@ -1837,7 +1836,7 @@ MUTANTS = (
          "failing_as",
          "ArithmeticError",
          "ZeroDivisionError",
-         f"{DOMAINS}an_equilibrium_from_a_triangle_that_is_turned_over_fails_in_growth")),
+         f"{DOMAINS}a_run_shortens_a_step_in_which_a_stage_leaves_its_domain")),
     *changes(
         "repro/march/simulation.py",
         ("fields-of-the-first-row",
@@ -2282,13 +2281,13 @@ MUTANTS = (
          "_tips",
          '-outline.upstream if side == "upstream" else outline.downstream',
          "-outline.upstream",
-         f"{MIRRORS}a_run_ends_at_either_end_of_the_pore_and_names_it"),
+         "tests/test_ends.py::test_every_end_is_located_within_its_step"),
         ("every-end-upstream",
          "Either end of the pore is named the upstream one.",
          "_events",
          "f\"{nearest} reaches the pore's {side} end at t = {pore.time:g} h\"",
          "f\"{nearest} reaches the pore's upstream end at t = {pore.time:g} h\"",
-         f"{MIRRORS}a_run_ends_at_either_end_of_the_pore_and_names_it")),
+         "tests/test_ends.py::test_every_end_is_located_within_its_step")),
     *changes(
         "repro/preflight/numbers.py",
         ("reach-downstream-alone",
@@ -2408,7 +2407,7 @@ MUTANTS = (
          "velocity",
          "{LAW: added.length, MOST: added.least, LEAST: added.most}[side]",
          "added.length",
-         f"{THROATS}the_bounds_enclose_what_the_bounds_of_both_laws_admit")),
+         f"{THROATS}the_recorded_areas_are_those_of_the_law_and_its_bounds")),
     *changes(
         "verification/network/runs.py",
         ("throats-with-the-first-supply",
@@ -2416,7 +2415,7 @@ MUTANTS = (
          "scene",
          '_table(one.time, values, "mg/L")',
          '_table(one.time[:1], values[:1], "mg/L")',
-         f"{THROATS}a_scene_has_the_history_of_its_throat"),
+         f"{THROATS}a_whole_run_gives_the_recorded_values"),
         ("throats-judged-above-alone",
          "A run below the lower bound is judged to be within the bounds.",
          "Comparison.holds",
@@ -2583,7 +2582,7 @@ MUTANTS = (
          "clogging",
          "low = np.flatnonzero(relative <= threshold)",
          "low = np.flatnonzero(relative <= threshold * relative.max())",
-         "tests/test_shrinking.py::test_the_clogging_time_of_an_exponential_fall_is_exact")),
+         "tests/test_sweep.py::test_the_clogging_time_of_an_exponential_fall_is_exact")),
     *changes(
         "repro/sweeps/page.py",
         ("axis-of-first-values",
