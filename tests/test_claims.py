@@ -130,6 +130,8 @@ SYNTHETIC = {"time_h": HOURS, "aggregate_area_um2": AREA, "conductivity_m_per_d"
 #: The last shape with a film and the first without, with a 20th of the conductivity.
 TOUCHING = {"time_h": np.array([36.0, 36.1]), "aggregate_area_um2": np.array([9000.0, 9100.0]),
             "conductivity_m_per_d": 24e-6 * clean(SCENE) * 50 / np.array([9000.0, 20 * 9100.0])}
+#: The rows before, and both.
+APPROACH = {key: np.append(SYNTHETIC[key][HOURS < 36], values) for key, values in TOUCHING.items()}
 #: Two steps: supplies 10 mg/L of 1 and 3 um2 of water, of which 40 and 20 % are taken up; biomass that lacks 2 %.
 STEPS = {"end_h": np.array([1.0, 2.0]), "biomass_before_pg_per_m": np.array([100.0, 150.0]),
          "biomass_made_pg_per_m": np.array([50.0, 40.0]), "biomass_after_pg_per_m": np.array([150.0, 186.2])}
@@ -150,9 +152,11 @@ CREASED = np.exp(100 * (1 - 0.647) / 8)
 VALUES = {
     "steepness": (lambda: permeability.steepness(("wide",)),
                   1 + np.log(20) / np.log(1.1)),
-    "steepness over a layer's": (lambda: permeability.slopes(("wide",), "wide")[1].value, (
+    "steepness over a layer's": (lambda: permeability.slopes(("wide",), "wide")[-1].value, (
         1 + np.log(20) / np.log(1.1)) * np.log(1.1) / np.log(layered_channel.gradient(1.0, 9100 / 6e4, 2000.0)
                                                             / layered_channel.gradient(1.0, 9100 / 6.6e4, 2000.0))),
+    "fall within a quarter more biomass": (lambda: permeability.fall_of(("wide",), 0.25), 20 * 1.25),
+    "steepest slope while a film is left": (lambda: permeability.steepest_with_film(("wide",)), 1.0),
     "slope of a layer in a pore twice as long": (
         lambda: permeability.layer_slope(("wide",), 12.0) * np.log(1.1),
         np.log(layered_channel.gradient(1.0, 9100 / 12e4, 2000.0)
@@ -196,6 +200,7 @@ def test_a_function_of_claims_gives_its_closed_form_on_a_synthetic_run(name, mon
     changed = SYNTHETIC | {"conductivity_m_per_d": 1.2 * SYNTHETIC["conductivity_m_per_d"]}
     tables = {"wide": SYNTHETIC, "changed": changed, "even": EVEN}
     replaced = {"series": lambda run: tables[run], "around_contact": lambda run: TOUCHING,
+                "approach": lambda run: APPROACH,
                 "load_packaged": lambda run: SCENE, "ledger": lambda run: STEPS,
                 "at": lambda run, time: {key: column[HOURS == time][0] for key, column in tables[run[0]].items()}}
     for module in (runs, permeability, discussed, assumed, rheology, scheme):

@@ -13,6 +13,11 @@ Some meanings were taken back after their values were known. C46 and C53 say "co
 percent", the paper's accuracy of its balance. It held, and the claim would be a matter of degree; but the effluents
 are printed digits and not words. For C36 it was "1 % at the end of 600 um". It failed (2.6 %), and the claim would be
 a matter of degree; but the sentence is about a sufficiently long channel, and at 900 um the effect is 1 %.
+
+C16 and C43 compared a slope over the last 10 % of biomass, between hourly rows, with that of a fall to a tenth within a
+quarter more biomass. They now compare this fall itself, from 50 rows up to contact. The new numbers were known from a
+reader's computation when the definition was written: a fall of 7.5 times in base, a slope of 11.5 in wide, and of 7.3
+at most while a film is left.
 """
 
 from math import inf
@@ -88,7 +93,7 @@ MEANINGS |= {
         Meaning("to a hundredth at contact, and twice as steeply as with a uniform layer", FIRST,
                 ("K / K_clean", "wide: -d ln K / d ln A over")),
         Meaning("to a tenth within a quarter more biomass", "sharply: an order of magnitude while the aggregate hardly "
-                "grows", ("slope of wide",)),
+                "grows", ("fall of wide",)),
         Meaning("at the moment of contact, to a tenth", "section 4: \"When the aggregate ... attaches to the opposite "
                 "wall, flow is forced through the aggregate\"", ("fall as the last film closes",))),
     "C18": (
@@ -181,7 +186,7 @@ MEANINGS |= {
         Meaning("to a tenth; twice as steeply as with a uniform layer", FIRST,
                 ("velocity", "acceptor", "growth", "decay", "base: -d ln K / d ln A over")),
         Meaning("to a half; to a tenth within a quarter more biomass", "restricts: limits; sharply as in C16",
-                ("velocity", "acceptor", "growth", "decay", "slope of base"),
+                ("velocity", "acceptor", "growth", "decay", "fall of base"),
                 {name: (-inf, 0.5) for name in ("velocity", "acceptor", "growth")})),
     "C46": (
         Meaning("by 5 % in one state", FIRST),

@@ -59,10 +59,13 @@ RECHOSEN = "fixed points rechosen"
 CONSTANTS = {**{f"c = {c}": (flow, "STABILISATION", float(c)) for c in (25, 50, 200, 400)},
              **{f"gamma = {gamma:g}": (mesh_motion, "COMPRESSIBILITY", gamma) for gamma in (0.1, 10.0)}}
 #: Beginnings of the keys whose changes have no effect until the aggregate is near the opposite wall; and the thickness
-#: over the pore's width up to which it is not near.
-LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
+#: over the pore's width up to which it is not near. A half-disc that spans the pore has more than 1.25 times the area
+#: of one of this thickness, also if the last state before lies an update earlier (`approach`).
+LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.8
 #: Time (h) from the last shape with a film to contact: 18 s.
 FILM = 0.005
+#: Rows of `approach`: a row then has at most 1 % more biomass than the last.
+DENSE = 50
 
 
 def rows_at(*hours: float) -> str:
@@ -187,6 +190,18 @@ def around_contact(*run: str) -> Columns:
     if computed.contact is None:
         raise LookupError(f"{run} does not touch the opposite wall")
     return columns([results.row(computed.scene, report) for report in computed.contact])
+
+
+@cached
+def approach(*run: str) -> Columns:
+    """Columns of DENSE rows at equal intervals of time from the last state that is not NEAR the opposite wall up to
+    contact, then those of `around_contact`. The steps are those of the run. Raises LookupError without contact."""
+    touching, far = around_contact(*run), history(*run).far
+    times = np.linspace(far.pore.time, touching["time_h"][0], DENSE + 1)[1:-1]
+    scene = ending(history(*run).scene, *map(float, times))
+    dense = [results.row(scene, report) for _, report in simulation.steps(scene, far) if report]
+    rows = columns([row for row in dense if row["time_h"] > far.pore.time])
+    return {name: np.append(values, touching[name]) for name, values in rows.items()}
 
 
 def contact_time(*run: str) -> float:
