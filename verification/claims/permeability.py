@@ -131,7 +131,7 @@ def steepness(run: Run, lengths: float | None = None) -> float:
 
 
 def fall_of(run: Run, gained: float, lengths: float | None = None) -> float:
-    """K with 1 / (1 + gained) of the biomass at contact over K just after contact, in a pore of a length over its width,
+    """K with 1 / (1 + gained) of the biomass at contact over K just after contact; lengths: of the pore over its width,
     by default the run's own."""
     area, share = map(np.log, _approach(run, lengths))
     return float(np.exp(np.interp(area[-1] - np.log(1 + gained), area[:-1], share[:-1]) - share[-1]))
