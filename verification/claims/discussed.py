@@ -22,7 +22,7 @@ from repro.network.throats import added_resistance
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, claim
 from verification.claims.base_run import upstream_means
-from verification.claims.levels import ABOUT_WIDE
+from verification.claims.levels import ABOUT_WIDE, PAIRED
 from verification.claims.permeability import CLOSING, LENGTHS, at_length, clean, layered_share
 from verification.claims.runs import (
     BASE,
@@ -242,7 +242,7 @@ LEAST = 0.1
 
 
 @claim("C44", "5", "the model of a pore can be incorporated into a network model", date="2026-11-29 23:14",
-       **ABOUT_WIDE)
+       fine=PAIRED, beside=())
 def for_networks() -> Finding:
     """Added resistance of the aggregates of base and wide against the law for networks, which was not fitted to
     them. "Can": one scene within the law's bound is enough. The values were known when it was judged: 0.022, 0.32 and

@@ -77,7 +77,9 @@ MEANINGS |= {
         Meaning("95 % of the new area and of the new biomass", FIRST),
         Meaning("99 % of both", "only: what a line of Figure 6 could show", ("",),
                 {"new area": (99, inf), "biomass made": (99, inf)})),
-    "C13": few("correction needed", judges=("correction needed", "least error")),
+    "C13": (
+        *few("correction needed", judges=("correction needed", "least error")),
+        Meaning("at every time", "section 4: \"throughout the whole numerical simulation\"", ("hour until",))),
     "C14": (
         Meaning("the defect halves with the mesh size at least", FIRST),
         Meaning("the defect falls", "\"leads to a better mass balance\"", ("",), {"fall of the": (1, inf)})),
@@ -229,9 +231,10 @@ MEANINGS |= {
         Meaning("within 0.01 %", "an initial condition that does not matter at all", ("",),
                 under(acceptor_after=0.01, donor_after=0.01, biomass_made=0.01))),
     "C63": (
-        Meaning("to a hundredth of the way", FIRST),
-        Meaning("to a tenth of the way", "regain: as an observer sees it", ("",), {"base": (-inf, 0.1),
-                                                                                  "wide": (-inf, 0.1)})),
+        Meaning("to a hundredth of the way", FIRST, ("base", "wide")),
+        Meaning("to a tenth of the way; bent at all", "regain: as an observer sees it", ("",),
+                {"base": (-inf, 0.1), "wide": (-inf, 0.1), "the most": (0, inf)}),
+        Meaning("bent visibly", "the sentence reports what was observed: \"bending with the flow\"", ("the most",))),
     "C64": few("base", "wide", judges=("base: fall", "wide: fall")),
 }
 

@@ -81,7 +81,6 @@ SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 END = 120.0
 #: Claims about this run that are not judged again, with the reasons: they compare it with other models.
 LEFT_OUT = {"C32": "compares two rheologies of new biomass", "C41": "changes the rheology and the walls",
-            "C44": "compares it with the law for networks",
             "C46": "compares its stresses with and without the fluid's forces",
             "C63": "compares its shapes with and without them"}
 #: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
