@@ -312,7 +312,7 @@ EXACT = 1e-7
 FINE = 1e-5
 FIRST = 0.0
 #: Sizes of the elements; those of wide are expensive on finer meshes.
-COARSER = (1.0, 2.0)
+COARSER = (1.0, 2**0.5, 2.0)
 #: Seconds in an hour.
 HOUR = 3600.0
 #: A disturbance of the profiles, and the number of steps after which it is measured.
