@@ -47,6 +47,8 @@ def more(*names: str, judges: tuple[str, ...] = ("",)) -> tuple[Meaning, Meaning
             Meaning("more than 10 %", ORDER_OF, judges, {name: (10, inf) for name in names}))
 
 
+#: The quantities of C15 in one shape.
+ONE_SHAPE = ("acceptor consumed at", "donor consumed at", "share of")
 #: The choices of C41.
 VARIED = ("born stress-free", "middles rechosen", "film halved", "film doubled", "angle halved", "angle doubled")
 
@@ -84,12 +86,15 @@ MEANINGS |= {
         Meaning("the defect halves with the mesh size at least", FIRST),
         Meaning("the defect falls", "\"leads to a better mass balance\"", ("",), {"fall of the": (1, inf)})),
     "C15": (
-        Meaning("within 5 %", FIRST),
-        Meaning("within 10 %", "about the same: as \"~60 %\" is about 58.1", ("",),
+        Meaning("within 5 %", FIRST, ONE_SHAPE),
+        Meaning("within 10 %", "about the same: as \"~60 %\" is about 58.1", ONE_SHAPE,
                 {"acceptor consumed": (0.9, 1.1), "donor consumed": (0.9, 1.1)}),
         Meaning("nearer to zero than to first order", "the paper's reason: \"Monod kinetics simplifies to zero order "
-                "reaction\"; first order doubles the uptake", ("",),
-                {"acceptor consumed": (-inf, 1.5), "donor consumed": (-inf, 1.5)})),
+                "reaction\"; first order doubles the uptake", ONE_SHAPE,
+                {"acceptor consumed": (-inf, 1.5), "donor consumed": (-inf, 1.5)}),
+        Meaning("in runs with both supplies, within 10 %", "\"if influent concentration were higher\": from the start on",
+                ("acceptor consumed in", "donor consumed in"),
+                {"acceptor consumed in": (0.9, 1.1), "donor consumed in": (0.9, 1.1)})),
     "C16": (
         Meaning("to a hundredth at contact, and twice as steeply as with a uniform layer", FIRST,
                 ("K / K_clean", "wide: -d ln K / d ln A over")),
