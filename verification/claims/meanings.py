@@ -92,7 +92,7 @@ MEANINGS |= {
         Meaning("nearer to zero than to first order", "the paper's reason: \"Monod kinetics simplifies to zero order "
                 "reaction\"; first order doubles the uptake", ONE_SHAPE,
                 {"acceptor consumed": (-inf, 1.5), "donor consumed": (-inf, 1.5)}),
-        Meaning("in runs with both supplies, within 10 %", "\"if influent concentration were higher\": from the start on",
+        Meaning("in runs with both supplies, within 10 %", "\"if influent concentration were higher\": from the start",
                 ("acceptor consumed in", "donor consumed in"),
                 {"acceptor consumed in": (0.9, 1.1), "donor consumed in": (0.9, 1.1)})),
     "C16": (

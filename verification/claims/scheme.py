@@ -260,8 +260,8 @@ def richer_supply() -> Finding:
     reason = (f"base is not in the zero-order range at 19.2 h (C33): m_A = {m_a:.2f} and m_D = {m_d:.2f} at its lowest "
               f"concentrations, so the uptake there is {100 * m_a * m_d:.0f} % of its maximum and can rise")
     note = (f"In runs the uptake of the acceptor is {in_runs[0]:.2f} times as large, because the aggregate has grown "
-            f"to {grown_more:.2f} times the area; per area it is {in_runs[0] / grown_more:.2f} times as large, since the "
-            "larger aggregate lets less water through. These were known when they were added: 1.47 in `fast`.")
+            f"to {grown_more:.2f} times the area; per area it is {in_runs[0] / grown_more:.2f} times as large, since "
+            "the larger aggregate lets less water through. These were known when they were added: 1.47 in `fast`.")
     return Finding(tuple(checks), reason=reason, note=note)
 
 
