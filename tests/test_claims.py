@@ -24,10 +24,12 @@ from verification.claims import (
     Dependence,
     Finding,
     Meaning,
+    adhesion,
     after_contact,
     assumed,
     discussed,
     evaluate,
+    fluid_and_aggregate,
     folds,
     permeability,
     report,
@@ -35,6 +37,7 @@ from verification.claims import (
     runs,
     scheme,
 )
+from verification.claims.levels import CONVERGED, Level, at_level
 from verification.claims.permeability import clean
 from verification.uncertainty import Bar
 
@@ -210,6 +213,17 @@ def test_a_function_of_claims_gives_its_closed_form_on_a_synthetic_run(name, mon
                 monkeypatch.setattr(module, function, value)
     computed, expected = VALUES[name]
     assert computed() == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_growth_that_slides_distorts_nothing_and_softens_the_aggregate():
+    """The mean distortion of base after 1 h is one, as far as growth is even; its least modulus falls with the volume
+    ratio J as J^(-2/3), and the area has grown by J."""
+    with at_level(Level(CONVERGED, 4.0)):
+        aggregate = runs.body((*runs.BASE, *runs.until(1)), 1.0)
+        grown = runs.series(*runs.BASE, *runs.until(1))["aggregate_area_um2"]
+    assert adhesion.distortion(aggregate) == pytest.approx(1, abs=1e-3)
+    softened = 1e6 * aggregate.scene.growth.shear_modulus * (grown[-1] / grown[0]) ** (-2 / 3)
+    assert fluid_and_aggregate.forces(aggregate).stiffness == pytest.approx(softened, rel=1e-3)
 
 
 # The committed record.

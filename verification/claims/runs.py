@@ -10,6 +10,7 @@ aggregates of a prescribed shape.
 
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import cached_property
 from unittest import mock
 
 import numpy as np
@@ -31,6 +32,7 @@ from repro.model.kinetics import Sink
 from repro.model.mechanics import Expansion, Mechanics, middle_of
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
+from repro.model.solid import Strained
 from repro.model.solving import Solved, solve
 from repro.model.stages import Stages
 from repro.results.arrays import State as Reported
@@ -293,6 +295,11 @@ class Body(Reported):
     def areas(self) -> np.ndarray:
         """(t,) um2 of the biomass triangles, of curved ones too."""
         return self.pore.space.at.dx[self.grid.biomass].sum(axis=1)
+
+    @cached_property
+    def strained(self) -> Strained:
+        """F and J since t = 0 at the points where growth is integrated."""
+        return self.pore.body.solid.strained(self.grid.points[self.grid.body])
 
     def concentration(self, name: str) -> np.ndarray:
         """(N,) mg/L of a substrate."""
