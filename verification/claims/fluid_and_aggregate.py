@@ -107,11 +107,11 @@ def fluid_forces() -> Finding:
     effects = {hour: effect_of_forces(hour) for hour in HOURS}
     checks += [at_most(f"forces included, wide, {hour} h: {name} (%)", "neglected", abs(effect[name]), 100 * FEW,
                        FEW_WORDS) for hour, effect in effects.items() for name in list(effect)[:-1]]
+    most = max(abs(effect["conductivity"]) for effect in effects.values())
     reason = (f"it holds in base, and in wide while a film of fluid is left. Later a head of {last.head:.3g} Pa drives "
               f"the constant mean velocity through the plug; growth's shear stress is {last.growth:.3g} Pa, and the "
-              f"stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa. The forces are not small as stresses, but "
-              f"they change the conductivity by {max(abs(effect['conductivity']) for effect in effects.values()):.1g} % "
-              "at most")
+              f"stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa. The forces are not small as "
+              f"stresses, but they change the conductivity by {most:.1g} % at most")
     changes = "; ".join(f"{hour} h: {effect['conductivity']:+.2f} %, {effect['slide']:+.1f} um"
                         for hour, effect in effects.items())
     note = (f"In base at {UPDATE} h, when growth has hardly begun, the first ratio is {early.against_growth:.2g}, but "
