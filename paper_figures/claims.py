@@ -39,7 +39,7 @@ STATEMENTS = {
     "C44": "a pore can be incorporated into a network model",
     "C45": "aggregate or layer, the distinction is not crucial for the consumption of substrates",
     "C46": "the stress could link fluid flow, growth and detachment",
-    "C47": "a mass transfer coefficient cannot be set a priori, since it depends on geometry and flow",
+    "C47": "a mass transfer coefficient is hard to set a priori, since the aggregate enhances its transport",
     "C48": "the surface is smooth, since the energy of the aggregate is minimal",
     "C49": "expansion by 2000 can be handled, also where the aggregate grows unevenly",
     "C50": "biomass bound to the wall distorts the geometry highly",

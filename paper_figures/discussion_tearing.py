@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from paper_figures import figure_6, style
-from repro.errors import GrowthError
-from verification.claims.fluid_and_aggregate import AVERAGED_OVER, peak, with_fluid_forces
+from verification.claims.adhesion import FORCED
+from verification.claims.fluid_and_aggregate import AVERAGED_OVER, peak
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
-from verification.claims.runs import BASE, WIDE, Body, bodies, load_packaged
+from verification.claims.runs import BASE, WIDE, Body, Run, bodies, load_packaged
 
 TITLE = "Addition. Where the aggregate would tear"
 RUNS = ()
@@ -34,31 +34,29 @@ EVERY = 5.0
 PASCAL = 1e6  # Pa in one MPa
 
 
+def with_forces(run: Run, forced: bool) -> Run:
+    """A run, or the same with the fluid's forces on the aggregate from the seed on."""
+    return (*run, FORCED) if forced else run
+
+
 @cached
-def stress_history(run: tuple[str, ...], forced: bool) -> np.ndarray:
+def stress_history(run: Run) -> np.ndarray:
     """Largest principal stress (Pa), its location (um), the time (h) and the length (um) of the aggregate in every
-    second row after t = 0, (n, 5), with or without the fluid's forces. The history ends where shape and flow do not
-    converge."""
+    second row of a run after t = 0, up to its end, (n, 5)."""
     rows = []
     for body in bodies(run)[:0:-2][::-1]:
-        try:
-            largest = peak(with_fluid_forces(body) if forced else body)
-        except GrowthError:
-            break
+        largest = peak(body)
         modulus = PASCAL * body.scene.growth.shear_modulus
         rows.append((modulus * largest.value, largest.x, largest.y, body.pore.time,
                      body.outline.downstream - body.outline.upstream))
-    return np.array(rows).reshape(-1, 5)
+    return np.array(rows)
 
 
-def agreed(run: tuple[str, ...], forced: bool) -> np.ndarray:
+def agreed(run: Run) -> np.ndarray:
     """The rows of a stress history whose locations agree with those on larger elements, (m, 5)."""
-    rows = stress_history(run, forced)
+    rows = stress_history(run)
     with at_level(COARSER):
-        coarser = stress_history(run, forced)
-    count = min(len(rows), len(coarser))
-    rows = rows[:count]
-    apart = np.hypot(*(rows[:, 1:3] - coarser[:count, 1:3]).T)
+        apart = np.hypot(*(rows[:, 1:3] - stress_history(run)[:, 1:3]).T)
     return rows[apart <= AVERAGED_OVER * np.minimum(load_packaged(*run).pore.width, rows[:, 4])]
 
 
@@ -69,7 +67,7 @@ def draw() -> Figure:
     panels = figure.subplot_mosaic([["size"], ["without"], ["with"]], height_ratios=[1.2, 1, 1])
     with at_level(LEVEL):
         _sizes(panels["size"])
-        norm = Normalize(0, bodies(RUN_OVERRIDES[1])[-1].pore.time)
+        norm = Normalize(0, bodies(WIDE)[-1].pore.time)
         colours = ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
         for name, forced in (("without", False), ("with", True)):
             _places(panels[name], colours, forced)
@@ -83,7 +81,7 @@ def draw() -> Figure:
 def _sizes(axes: Axes) -> None:
     for run, colour in zip(RUN_OVERRIDES, COLOURS):
         for forced, line in ((False, "-"), (True, "--")):
-            size, _, _, hours, _ = stress_history(run, forced).T
+            size, _, _, hours, _ = stress_history(with_forces(run, forced)).T
             axes.plot(hours, size, line, color=colour)
     handles = [Line2D([], [], color=colour, label=name) for name, colour in zip(NAMES, COLOURS)]
     handles += [Line2D([], [], color=style.BLACK, linestyle=line, label=label)
@@ -95,29 +93,17 @@ def _sizes(axes: Axes) -> None:
 
 
 def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
-    """Outlines every EVERY hours, those of the same equilibrium, and the locations of the largest stress that
-    converge."""
-    outlined = outlined_bodies(forced)
+    """Outlines of a run every EVERY hours, and the locations of its largest stress that converge."""
+    run = with_forces(WIDE, forced)
+    outlined = [body for body in bodies(run) if body.pore.time % EVERY == 0]
     reach = np.concatenate([body.outline.points[:, 0] for body in outlined])
     ends, width = (reach.min() - figure_6.MARGIN, reach.max() + figure_6.MARGIN), outlined[0].grid.width
     style.pore(axes, ends, width, 2.5)
     axes.set_anchor("W")
     for body in outlined:
         style.aggregate(axes, _rim(body), filled=False, edgecolor=colours.to_rgba(body.pore.time), linewidth=0.7)
-    _, x, y, hours, _ = agreed(RUN_OVERRIDES[1], forced).T
+    _, x, y, hours, _ = agreed(run).T
     axes.scatter(x, y, c=colours.to_rgba(hours), s=16, edgecolors="black", linewidths=0.4, zorder=5)
-
-
-def outlined_bodies(forced: bool) -> list[Body]:
-    """Wide every EVERY hours, with or without the fluid's forces, as far as shape and flow converge."""
-    outlined = []
-    for body in bodies(RUN_OVERRIDES[1]):
-        if body.pore.time % EVERY == 0:
-            try:
-                outlined.append(with_fluid_forces(body) if forced and body.pore.time else body)
-            except GrowthError:
-                break
-    return outlined
 
 
 def _rim(body: Body) -> np.ndarray:
@@ -126,19 +112,16 @@ def _rim(body: Body) -> np.ndarray:
 
 def caption() -> str:
     """Caption, with stresses at the end of both runs, how many locations converge, and the effect of the fluid."""
-    run = RUN_OVERRIDES[1]
     with at_level(LEVEL):
-        forced, without = stress_history(run, True), stress_history(run, False)
-        drawn = [f"{len(agreed(run, kind))} of {len(stress_history(run, kind))}" for kind in (False, True)]
-        ends = [(*stress_history(each, False)[-1, [0, 3]], name) for name, each in zip(NAMES, RUN_OVERRIDES)]
-        last = bodies(run)[-1].pore.time
+        forced, without = (stress_history(with_forces(WIDE, kind)) for kind in (True, False))
+        drawn = [f"{len(agreed(with_forces(WIDE, kind)))} of {len(rows)}"
+                 for kind, rows in ((False, without), (True, forced))]
+        ends = [(*stress_history(run)[-1, [0, 3]], name) for name, run in zip(NAMES, RUN_OVERRIDES)]
     peaks = "; ".join(f"{name} {value:.3g} Pa at {hours:g} h" for value, hours, name in ends)
     size, _, _, hours, _ = forced[-1]
-    note = ("" if hours == last else " Later the head that drives the constant velocity bends the plug so far that "
-                                     "shape and flow do not converge.")
     return (f"(a) Largest principal stress in the mean over a tenth of the pore's width: {peaks}. (b) Its location in "
             f"Wide ({figure_6.ASSUMED}), with outlines every {EVERY:g} h. Only locations that converge are shown: "
             "those that agree within this distance, and a tenth of the length of the aggregate, on elements "
             f"{PAIRED[1]:.3g} and {PAIRED[2]:.3g} times as large as those of the preset `accurate`, {drawn[0]} rows. "
-            f"(c) The same aggregates in equilibrium with the fluid's forces, {drawn[1]} rows: {size:.3g} Pa instead "
-            f"of {without[len(forced) - 1, 0]:.3g} Pa at {hours:g} h.{note}")
+            f"(c) The same in a run with the fluid's forces from the seed on, with its own outlines, {drawn[1]} rows: "
+            f"{size:.3g} Pa instead of {without[-1, 0]:.3g} Pa at {hours:g} h.")

@@ -108,5 +108,5 @@ def caption() -> str:
             f"{hours:g} h with the biomass of {hours + UPDATE:g} h, the state that the paper reports (E12). (c)-(e) "
             f"Steady half-discs, of {RADIUS:g} µm in (c) and (d). The number of the acceptor rises from {slow[0]:.2g} "
             f"to {fast[0]:.2g} with velocity, and goes from {poor[0]:.3g} to {rich[0]:.3g} between supplies of "
-            f"{SUPPLIES[0]:.1g} and {SUPPLIES[-1]:.0f} K_s: as long as the aggregate is fully penetrated, the number "
-            "depends on shape and flow, and hardly on the sink.")
+            f"{SUPPLIES[0]:.1g} and {SUPPLIES[-1]:.0f} K_s. With the drop from the supply the number depends on shape "
+            "and flow more than on the sink; with the drop from the aggregate's edge it depends on the sink (C39).")

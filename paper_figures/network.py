@@ -18,6 +18,8 @@ CLAIMS = ("C16", "C17", "C44")
 #: Viscosity ratios of the curves. The bounds are drawn for the viscosity ratio of the points.
 RATIOS = (100.0, RATIO, 10000.0)
 COLOURS = (style.SKY, style.BLUE, style.RED)
+#: Widths of the lines, so that each is seen where they coincide.
+WIDTHS = (3.0, 1.8, 0.8)
 POINTS = 300
 
 
@@ -34,12 +36,13 @@ def draw() -> Figure:
 
 def _law(axes: Axes) -> None:
     """r against A / W^2, before contact and after it."""
-    for ratio, colour in zip(RATIOS, COLOURS):
+    for ratio, colour, width in zip(RATIOS, COLOURS, WIDTHS):
         for spanned in (False, True):
             share = np.geomspace(*share_range(spanned), POINTS)
             resistance = added_resistance(share, 1.0, spanned, ratio)
             label = None if spanned else rf"$\lambda$ = {ratio:g}"
-            axes.plot(share, resistance.length, color=colour, linestyle="--" if spanned else "-", label=label, zorder=3)
+            axes.plot(share, resistance.length, color=colour, linestyle="--" if spanned else "-", linewidth=width,
+                      label=label, zorder=3)
             if ratio == RATIO:
                 axes.fill_between(share, resistance.least, resistance.most, color=colour, alpha=0.2, linewidth=0)
     fitted = read(unseen=False)

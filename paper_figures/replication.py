@@ -47,8 +47,8 @@ FIELD = re.compile(r"\{\{(.+?)\}\}")
 #: Names of the verdicts in the templates, and the parts of a claim that the register quotes beside its numbers.
 NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "degree", "depends", "contradicted", "undecided",
                             "unjudged")))
-WHY = {"Depends": "dependence", "Changed": "change", "Why not": "reason", "Inputs": "rounding", "Note": "note",
-       "Not varied": "fixed"}
+WHY = {"Depends": "dependence", "Meaning taken back": "taken_back", "Changed": "change", "Why not": "reason",
+       "Inputs": "rounding", "Note": "note", "Not varied": "fixed"}
 WIDTH = 120
 
 

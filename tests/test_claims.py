@@ -24,10 +24,12 @@ from verification.claims import (
     Dependence,
     Finding,
     Meaning,
+    adhesion,
     after_contact,
     assumed,
     discussed,
     evaluate,
+    fluid_and_aggregate,
     folds,
     permeability,
     report,
@@ -35,6 +37,7 @@ from verification.claims import (
     runs,
     scheme,
 )
+from verification.claims.levels import CONVERGED, Level, at_level
 from verification.claims.permeability import clean
 from verification.uncertainty import Bar
 
@@ -99,14 +102,15 @@ def test_a_threshold_is_that_of_all_numbers_with_the_same_words():
 
 
 def test_every_claim_with_words_of_degree_has_two_to_four_meanings():
-    """Other claims are not judged, or have only printed numbers, closed forms, places and signs, or depend on their
-    scene. The first meaning has the bounds of the claim's numbers."""
+    """Other claims are not judged, or have only printed numbers, closed forms, places and signs, or say that something
+    can be done, or depend on their scene. The first meaning has the bounds of the claim's numbers."""
     evaluate.register_all()
     assert all(2 <= len(meanings) <= 4 and not meanings[0].bounds for meanings in MEANINGS.values())
     assert all(meaning.words and meaning.origin for meanings in MEANINGS.values() for meaning in meanings)
     assert set(MEANINGS) <= {id for id, claim in CLAIMS.items() if not claim.unjudged}
     stated = {id for id, claim in CLAIMS.items() if not claim.unjudged} - set(MEANINGS)
-    assert stated == {"C01", "C04", "C05", "C06", "C07", "C08", "C10", "C17", "C23", "C27", "C28", "C37", "C48"}
+    assert stated == {"C01", "C04", "C05", "C06", "C07", "C08", "C10", "C17", "C23", "C27", "C28", "C37", "C40", "C44",
+                      "C48"}
 
 
 @pytest.mark.parametrize("end, low, high, outcome", [
@@ -130,6 +134,8 @@ SYNTHETIC = {"time_h": HOURS, "aggregate_area_um2": AREA, "conductivity_m_per_d"
 #: The last shape with a film and the first without, with a 20th of the conductivity.
 TOUCHING = {"time_h": np.array([36.0, 36.1]), "aggregate_area_um2": np.array([9000.0, 9100.0]),
             "conductivity_m_per_d": 24e-6 * clean(SCENE) * 50 / np.array([9000.0, 20 * 9100.0])}
+#: The rows before, and both.
+APPROACH = {key: np.append(SYNTHETIC[key][HOURS < 36], values) for key, values in TOUCHING.items()}
 #: Two steps: supplies 10 mg/L of 1 and 3 um2 of water, of which 40 and 20 % are taken up; biomass that lacks 2 %.
 STEPS = {"end_h": np.array([1.0, 2.0]), "biomass_before_pg_per_m": np.array([100.0, 150.0]),
          "biomass_made_pg_per_m": np.array([50.0, 40.0]), "biomass_after_pg_per_m": np.array([150.0, 186.2])}
@@ -150,9 +156,11 @@ CREASED = np.exp(100 * (1 - 0.647) / 8)
 VALUES = {
     "steepness": (lambda: permeability.steepness(("wide",)),
                   1 + np.log(20) / np.log(1.1)),
-    "steepness over a layer's": (lambda: permeability.slopes(("wide",), "wide")[1].value, (
+    "steepness over a layer's": (lambda: permeability.slopes(("wide",), "wide")[-1].value, (
         1 + np.log(20) / np.log(1.1)) * np.log(1.1) / np.log(layered_channel.gradient(1.0, 9100 / 6e4, 2000.0)
                                                             / layered_channel.gradient(1.0, 9100 / 6.6e4, 2000.0))),
+    "fall within a quarter more biomass": (lambda: permeability.fall_of(("wide",), 0.25), 20 * 1.25),
+    "steepest slope while a film is left": (lambda: permeability.steepest_with_film(("wide",)), 1.0),
     "slope of a layer in a pore twice as long": (
         lambda: permeability.layer_slope(("wide",), 12.0) * np.log(1.1),
         np.log(layered_channel.gradient(1.0, 9100 / 12e4, 2000.0)
@@ -196,6 +204,7 @@ def test_a_function_of_claims_gives_its_closed_form_on_a_synthetic_run(name, mon
     changed = SYNTHETIC | {"conductivity_m_per_d": 1.2 * SYNTHETIC["conductivity_m_per_d"]}
     tables = {"wide": SYNTHETIC, "changed": changed, "even": EVEN}
     replaced = {"series": lambda run: tables[run], "around_contact": lambda run: TOUCHING,
+                "approach": lambda run: APPROACH,
                 "load_packaged": lambda run: SCENE, "ledger": lambda run: STEPS,
                 "at": lambda run, time: {key: column[HOURS == time][0] for key, column in tables[run[0]].items()}}
     for module in (runs, permeability, discussed, assumed, rheology, scheme):
@@ -204,6 +213,17 @@ def test_a_function_of_claims_gives_its_closed_form_on_a_synthetic_run(name, mon
                 monkeypatch.setattr(module, function, value)
     computed, expected = VALUES[name]
     assert computed() == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_growth_that_slides_distorts_nothing_and_softens_the_aggregate():
+    """The mean distortion of base after 1 h is one, as far as growth is even; its least modulus falls with the volume
+    ratio J as J^(-2/3), and the area has grown by J."""
+    with at_level(Level(CONVERGED, 4.0)):
+        aggregate = runs.body((*runs.BASE, *runs.until(1)), 1.0)
+        grown = runs.series(*runs.BASE, *runs.until(1))["aggregate_area_um2"]
+    assert adhesion.distortion(aggregate) == pytest.approx(1, abs=1e-3)
+    softened = 1e6 * aggregate.scene.growth.shear_modulus * (grown[-1] / grown[0]) ** (-2 / 3)
+    assert fluid_and_aggregate.forces(aggregate).stiffness == pytest.approx(softened, rel=1e-3)
 
 
 # The committed record.

@@ -31,7 +31,7 @@ from repro.fem.outline import Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Walls, numbered
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
-CLOSE = 2e-3
+CLOSE = 5e-4
 #: Least distance from a line at which the angle is tested, over film / tan(angle). The converged
 #: surfaces of reference/gold come nearest to the wall at 0.31 to 1 of film / tan(angle).
 ANGLE_FROM = 0.2

@@ -43,7 +43,7 @@ def excess(radius: float, facing: bool = False, refinement: float = REFINEMENT) 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-semicircles", kind="cross-code", mutants=("viscosity-swapped", "plane-is-a-wall"),
+    "flow-semicircles", kind="benchmark", mutants=("viscosity-swapped", "plane-is-a-wall"),
     references=("semicircle_channel",), runs_with="2", omitted="order 1: flow-half-disc")
 @pytest.mark.parametrize("walls", RADII)
 def test_semicircles(walls, record):
@@ -62,7 +62,7 @@ def test_semicircles(walls, record):
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "flow-lubrication", kind="exact", mutants=("viscosity-swapped",), references=("semicircle_channel",),
+    "flow-lubrication", kind="benchmark", mutants=("viscosity-swapped",), references=("semicircle_channel",),
     runs_with="2", omitted="order 1: its own error exceeds the second term")
 def test_lubrication(record):
     """The loss in the gap between a semicircle and a wall tends to that of lubrication theory with the first power of

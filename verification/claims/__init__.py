@@ -24,8 +24,8 @@ and the claim has
     not judged                                                               if no value could contradict it
 
 Each worded bound has the threshold at which its outcome flips, computed from the bars (`report.flips`). If the paper
-says that something may or could happen, one scene with a measured effect is enough, and its absence in another scene
-contradicts nothing.
+says that something may, could or can happen, one scene with a measured effect is enough, and its absence in another
+scene contradicts nothing.
 
 A definition carries the date when it was written, which is before its first value. If the definition of a claim changes
 after its values are known, its other definitions stay in `other_definitions.json` with their outcomes. Every verdict
@@ -345,6 +345,8 @@ class Claim:
 CLAIMS: dict[str, Claim] = {}
 #: The meanings of the words of claims, by id, and when they were written; `meanings` fills them in.
 MEANINGS: dict[str, tuple[Meaning, ...]] = {}
+#: Meanings that were taken back after their values were known, by id, with the reason.
+TAKEN_BACK: dict[str, str] = {}
 WRITTEN = "2026-11-29 16:48"
 
 

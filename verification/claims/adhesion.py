@@ -19,7 +19,7 @@ from verification.claims.fluid_and_aggregate import FORCED as FORCED_WIDE
 from verification.claims.fluid_and_aggregate import HOURS
 from verification.claims.fluid_and_aggregate import UNFORCED as UNFORCED_WIDE
 from verification.claims.levels import ALONE, CONVERGED, FORCES, MANY, Level, at_level
-from verification.claims.rheology import conductivity_change, outline_shift
+from verification.claims.rheology import as_permeable, conductivity_change, outline_shift
 from verification.claims.runs import BASE, END, PLOTTED, Body, Run, body, load_packaged, polygon, uncovered, until
 from verification.problems.runs import contact_length
 
@@ -127,14 +127,10 @@ def part_of(without: float, with_it: float) -> float:
     return 100 * abs(with_it - without) / max(with_it, without)
 
 
-#: lambda of Table 1.
-LAMBDA = 2000
-
-
 def permeable_runs(run: Run, width: float) -> tuple[Run, Run]:
     """A run in a pore of a width (um) with a permeable aggregate, without and with the drag on the biomass."""
-    permeable = (*run, f'flow.permeability="{width**2 / (12 * LAMBDA)!r} um^2"')
-    return permeable, (*permeable, FORCED)
+    unforced = as_permeable(run, width)
+    return unforced, (*unforced, FORCED)
 
 
 @claim("C53", "5", "the action of water on a poroelastic aggregate as body forces may lead to differences, depending "

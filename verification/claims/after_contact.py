@@ -30,11 +30,11 @@ NOT_OF_BASE = ("C19", "C41")
 KINDS = {
     "a position, which is known to the size of an element": r"C10",
     "a small difference of two halves, runs or solutions, which is not much larger than their errors":
-        r"C11|C26, forces included|C36|C42|C53|C63|C64|.*(born stress-free|deviation|law's r|changed by the fluid)",
+        r"C11|C26, forces included|C36|C42|C44|C53|C63|C64|.*(born stress-free|deviation|law's r|changed by the fluid)",
     "a Sherwood number, whose drop of concentration is small against the supply, or a ratio of two, less one":
         r"C39|C47",
     "a peak of stress or strain, beside a corner or in one element, or a ratio of two peaks":
-        r".*(stress|strain)",
+        r"C40|.*(stress|strain)",
     "a share of less than 1 %, the small effect of the fluid on a body 2000 times as viscous": r"C35",
     "a body that is bonded to its wall, with stress that is singular at the corners": r"C50|C52",
     "a rim of few elements just before it folds": r"C48|C49",

@@ -262,9 +262,9 @@ def table_1() -> Finding:
                               100 * substrate.diffusivity_in_aggregate / substrate.diffusivity, rests_on=ARITHMETIC,
                               within=sensitivity.in_closed_form(lambda inner, outer: 100 * inner / outer,
                                                                 *printed_values)))
-    near_cod, near_d_c = COD + HALF_DIGIT, d_c - HALF_DIGIT
-    nearest = near_cod - y * near_d_c
-    rounding = (f"COD {near_cod:.3f}, Y {y:.3f} and d_c {near_d_c:.3f} round to the printed ones and give "
+    near_d_c = d_c - HALF_DIGIT
+    nearest = COD - y * near_d_c
+    rounding = (f"COD {COD:.3f} and Y {y:.3f} as printed and d_c {near_d_c:.3f}, which rounds to the printed one, give "
                 f"{nearest:.4f}")
     low, high = interval(f"{paper}")
     note = (f"Table 1's entries give {value:.4f} [E1]; with C6H6O + 7 O2 and C5H7O2N + 5 O2 for COD and d_c it is "

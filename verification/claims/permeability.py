@@ -24,6 +24,7 @@ from verification.claims.runs import (
     Body,
     Columns,
     Run,
+    approach,
     around_contact,
     bodies,
     contact_time,
@@ -48,17 +49,20 @@ def layered_share(ratio: float, part: float, walls: int) -> float:
     return open_**3 + (1.0 - open_**3) / ratio
 
 
-#: Part of its biomass that the aggregate gains up to contact in the window of a steepness.
-GAINED = 0.1
+#: Part of its biomass that the aggregate gains up to contact in the windows of a slope and of a fall; and in that of a
+#: slope while a film is left.
+GAINED, QUARTER, SMALL = 0.1, 0.25, 0.02
 #: "Sharply": this many times as steeply as under uniform layers of the same biomass.
 TWICE_AS_STEEP, SHARPLY = 2.0, "falls sharply"
 #: The slope with which a quarter more biomass leaves a tenth of the conductivity.
-TENFOLD = float(np.log(10) / np.log(1.25))
+TENFOLD = float(np.log(10) / np.log(1 + QUARTER))
 ORDER = "an order of magnitude"
+#: Words and origin of the bound of a slope.
+AS_TENFOLD = "the mean slope with which a quarter more biomass leaves a tenth of the conductivity"
 
 
 @claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore (at constant velocity; C43 at "
-       "constant head)", date="2026-11-24 13:01", **ABOUT_WIDE)
+       "constant head)", date="2026-11-29 23:11", **ABOUT_WIDE)
 def spanning() -> Finding:
     """Conductivity of `wide` against its biomass up to contact. At contact it is that of the first shape in which a
     film has closed. A film closes by entire edges of the outline, so the error is of first order in their length:
@@ -76,13 +80,18 @@ def spanning() -> Finding:
     return Finding(checks, change=change, reason="most of the fall precedes contact", note=_in_long_pores(WIDE))
 
 
-def slopes(run: Run, name: str) -> tuple[PaperCheck, PaperCheck]:
-    """-d ln K / d ln A of a run up to contact, and the same over that of a uniform layer of the same biomass. The
-    second depends on the length of the pore, since the layer does."""
+def slopes(run: Run, name: str) -> tuple[PaperCheck, ...]:
+    """How steeply the conductivity of a run falls up to contact, from the rows of `approach`: -d ln K / d ln A over
+    GAINED; the fall over QUARTER; the steepest slope over SMALL while a film is left; and the first over that of a
+    uniform layer of the same biomass. The last depends on the length of the pore, since the layer does."""
     scene = load_packaged(*run)
     slope, lengths = steepness(run), scene.pore.length / scene.pore.width
     return (at_least(f"slope of {name}: -d ln K / d ln A over the last {100 * GAINED:g} % of biomass up to contact",
-                     SHARPLY, slope, TENFOLD, "a tenth of the conductivity within a quarter more biomass"),
+                     SHARPLY, slope, TENFOLD, AS_TENFOLD),
+            at_least(f"fall of {name} over the last quarter more biomass up to contact (times)", SHARPLY,
+                     fall_of(run, QUARTER), 10.0, ORDER),
+            at_least(f"steepest slope of {name} while a film is left: -d ln K / d ln A over {100 * SMALL:g} % of "
+                     "biomass", SHARPLY, steepest_with_film(run), TENFOLD, AS_TENFOLD),
             at_least(f"{name}: -d ln K / d ln A over that of a uniform layer, in a pore of {lengths:g} W", SHARPLY,
                      slope / layer_slope(run, lengths), TWICE_AS_STEEP, "twice as steep at least"))
 
@@ -118,14 +127,31 @@ def _in_long_pores(run: Run) -> str:
 def steepness(run: Run, lengths: float | None = None) -> float:
     """-d ln K / d ln A of a run over the last part GAINED of its biomass up to contact, the closing film included;
     lengths: of the pore over its width, by default the run's own."""
-    rows, touching = series(*run), around_contact(*run)
-    early = rows["time_h"] < touching["time_h"][0]
-    area, share = (np.append(rows[key][early], touching[key]) for key in ("aggregate_area_um2", "conductivity_m_per_d"))
+    return float(np.log(fall_of(run, GAINED, lengths)) / np.log(1 + GAINED))
+
+
+def fall_of(run: Run, gained: float, lengths: float | None = None) -> float:
+    """K with 1 / (1 + gained) of the biomass at contact over K just after contact; lengths: of the pore over its width,
+    by default the run's own."""
+    area, share = map(np.log, _approach(run, lengths))
+    return float(np.exp(np.interp(area[-1] - np.log(1 + gained), area[:-1], share[:-1]) - share[-1]))
+
+
+def steepest_with_film(run: Run) -> float:
+    """Largest -d ln K / d ln A over a part SMALL of the biomass while a film is left."""
+    area, share = (np.log(values[:-1]) for values in _approach(run))
+    ends = area[area >= area[0] + np.log(1 + SMALL)]
+    falls = np.interp(ends - np.log(1 + SMALL), area, share) - np.interp(ends, area, share)
+    return float(falls.max() / np.log(1 + SMALL))
+
+
+def _approach(run: Run, lengths: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Areas (um2) and conductivities of the rows of `approach`, those over K_clean in a pore of another length."""
+    area, share = (approach(*run)[key] for key in ("aggregate_area_um2", "conductivity_m_per_d"))
     if lengths is not None:
         scene = load_packaged(*run)
         share = at_length(share / (24e-6 * clean(scene)), scene, lengths)
-    end, window = np.log(area[-1]), np.log(1 + GAINED)
-    return float(np.interp(end - window, np.log(area[:-1]), np.log(share[:-1])) - np.log(share[-1])) / window
+    return area, share
 
 
 @claim("C17", "2.1", "lambda = 2000 allows a permeability reduction of up to 2000 (pore filled over its length)",
@@ -150,7 +176,7 @@ CLOSING = ("base", f'growth.end="{END + 2} h"', rows_at(*range(2, 72), *np.arang
 
 
 @claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply, and the conductivity "
-       "falls sharply: under constant head too", fine=PAIRED, beside=BESIDE_PAIRS, date="2026-11-24 13:01")
+       "falls sharply: under constant head too", fine=PAIRED, beside=BESIDE_PAIRS, date="2026-11-29 23:11")
 def throttled() -> Finding:
     """Base to 76 h: flow, uptake and growth at the end over their first or largest values; decay of active biomass over
     its synthesis; and the fall of the conductivity with the biomass up to contact, as in C16."""

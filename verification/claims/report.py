@@ -4,9 +4,10 @@ The committed record of the claims, `claims.json`: intervals and verdicts that a
 
 An entry has the date of its definition, `defined`, and the time of the first value that was recorded for it,
 `first_value`. `meanings` are the meanings of its words with their verdicts, `flips` the thresholds at which the worded
-bounds flip, and `dependence` says with which values of an input that the paper does not print the claim holds. `former`
-are all verdicts that the claim had before: when a verdict changes, `--record` adds the last one. `other_definitions`
-are earlier definitions of the claim, with their outcomes and the reason why they were replaced.
+bounds flip, and `dependence` says with which values of an input that the paper does not print the claim holds.
+`taken_back` is a meaning that was taken back after its value was known. `former` are all verdicts that the claim had
+before: when a verdict changes, `--record` adds the last one. `other_definitions` are earlier definitions of the claim,
+with their outcomes and the reason why they were replaced.
 
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
 words), and `input_low` to `input_high` is its range as the inputs of Table 1 move within their rounding (from the
@@ -34,6 +35,7 @@ from verification.claims import (
     OF_SCHEME,
     PREDICTED,
     REACHES_OVER,
+    TAKEN_BACK,
     VERDICTS,
     Claim,
     ClaimError,
@@ -230,6 +232,7 @@ def entry(row: Row) -> dict:
             "change": finding.change, "reason": row.reason, "rounding": finding.rounding, "note": finding.note,
             "dependence": finding.dependence.text if finding.dependence else "", "fixed": claim.fixed,
             "depends": bool(finding.dependence and finding.dependence.splits),
+            "taken_back": TAKEN_BACK.get(row.id, ""),
             "meanings": _meanings(claim, given), "flips": flips(checks), "defined": claim.defined, "first_value": "",
             "former": [], "other_definitions": other_definitions().get(row.id, []), "checks": checks}
 
@@ -271,7 +274,8 @@ def judged_again(recorded: dict, claim: Claim) -> dict:
     sure = bool(checks) and all(check["outcome"] == HOLDS for check in checks)
     reason = (recorded["dependence"] if depends else "") if sure else recorded["reason"]
     return {**recorded, "reason": reason, "dependence": recorded.get("dependence", ""), "depends": depends,
-            "defined": claim.defined, "meanings": _meanings(claim, given), "flips": flips(checks),
+            "taken_back": TAKEN_BACK.get(claim.id, ""), "defined": claim.defined,
+            "meanings": _meanings(claim, given), "flips": flips(checks),
             "verdict": common_verdict(given, depends) if given else NOT_JUDGED}
 
 

@@ -10,6 +10,7 @@ aggregates of a prescribed shape.
 
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import cached_property
 from unittest import mock
 
 import numpy as np
@@ -31,6 +32,7 @@ from repro.model.kinetics import Sink
 from repro.model.mechanics import Expansion, Mechanics, middle_of
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
+from repro.model.solid import Strained
 from repro.model.solving import Solved, solve
 from repro.model.stages import Stages
 from repro.results.arrays import State as Reported
@@ -59,10 +61,13 @@ RECHOSEN = "fixed points rechosen"
 CONSTANTS = {**{f"c = {c}": (flow, "STABILISATION", float(c)) for c in (25, 50, 200, 400)},
              **{f"gamma = {gamma:g}": (mesh_motion, "COMPRESSIBILITY", gamma) for gamma in (0.1, 10.0)}}
 #: Beginnings of the keys whose changes have no effect until the aggregate is near the opposite wall; and the thickness
-#: over the pore's width up to which it is not near.
-LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
+#: over the pore's width up to which it is not near. A half-disc that spans the pore has more than 1.25 times the area
+#: of one of this thickness, also if the last state before lies an update earlier (`approach`).
+LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.8
 #: Time (h) from the last shape with a film to contact: 18 s.
 FILM = 0.005
+#: Rows of `approach`: a row then has at most 1 % more biomass than the last.
+DENSE = 50
 
 
 def rows_at(*hours: float) -> str:
@@ -189,6 +194,18 @@ def around_contact(*run: str) -> Columns:
     return columns([results.row(computed.scene, report) for report in computed.contact])
 
 
+@cached
+def approach(*run: str) -> Columns:
+    """Columns of DENSE rows at equal intervals of time from the last state that is not NEAR the opposite wall up to
+    contact, then those of `around_contact`. The steps are those of the run. Raises LookupError without contact."""
+    touching, far = around_contact(*run), history(*run).far
+    times = np.linspace(far.pore.time, touching["time_h"][0], DENSE + 1)[1:-1]
+    scene = ending(history(*run).scene, *map(float, times))
+    dense = [results.row(scene, report) for _, report in simulation.steps(scene, far) if report]
+    rows = columns([row for row in dense if row["time_h"] > far.pore.time])
+    return {name: np.append(values, touching[name]) for name, values in rows.items()}
+
+
 def contact_time(*run: str) -> float:
     """Time (h) at which a run touches the opposite wall."""
     return float(around_contact(*run)["time_h"][1])
@@ -278,6 +295,11 @@ class Body(Reported):
     def areas(self) -> np.ndarray:
         """(t,) um2 of the biomass triangles, of curved ones too."""
         return self.pore.space.at.dx[self.grid.biomass].sum(axis=1)
+
+    @cached_property
+    def strained(self) -> Strained:
+        """F and J since t = 0 at the points where growth is integrated."""
+        return self.pore.body.solid.strained(self.grid.points[self.grid.body])
 
     def concentration(self, name: str) -> np.ndarray:
         """(N,) mg/L of a substrate."""

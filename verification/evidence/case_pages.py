@@ -70,7 +70,8 @@ def index(records: Mapping[str, Mapping]) -> list[str]:
     kinds = "; ".join(f"*{kind}*, {words}" for kind, words in KINDS.items() if kind in {row[2] for row in rows})
     return [f"**{pages.summary(records.values())}** {pages.mutant_state()}",
             f"Kinds: {kinds}. Menus above the table choose stage, kind, elements, presets and equations; the field "
-            "filters by words. Elements of order 1 are linear, those of order 2 quadratic.", table(head, rows)]
+            "filters by words. Elements of order 1 are linear, those of order 2 quadratic. Comparisons with "
+            "measurements are on the page [Validation](../../docs/validation.md).", table(head, rows)]
 
 
 def article(case: Case, record: Mapping, folder: Path) -> list[str]:
