@@ -28,7 +28,7 @@ from repro.march.loop import time_before_end
 from repro.march.state import InterpolatedState, StepResult
 from repro.model import biomass, contact_lines, remeshing
 from repro.model.biomass import Rates, grow
-from repro.model.contact_lines import LINE_PARTS, PATIENT, FirstContact, SearchOptions
+from repro.model.contact_lines import PATIENT, FirstContact, SearchOptions
 from repro.model.mechanics import Expansion
 from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh
@@ -132,7 +132,7 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
     advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
                 for key in half.expansion.advances}
     search = replace(search, advances=advances,
-                     line_size=stages.remeshing.meshing.sizes.contact / LINE_PARTS)
+                     line_size=stages.remeshing.meshing.sizes.moving_lines)
     return stages.expand(previous, after, _guess_shape(previous, shapes), search)
 
 

@@ -31,14 +31,11 @@ from repro.fem.outline import Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Walls, numbered
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
+#: With 2e-3 that was 0.01 um, up to 0.2 % of a short length of contact (``growth-gold-contact``).
 CLOSE = 5e-4
 #: Least distance from a line at which the angle is tested, over film / tan(angle). The converged
 #: surfaces of reference/gold come nearest to the wall at 0.31 to 1 of film / tan(angle).
 ANGLE_FROM = 0.2
-#: Length of the triangles beside the contact lines of a new mesh, over those where a step ends. In
-#: ``fast``, lengths of contact of ``growth-gold-contact`` err by 0.5, 0.03, 0.07 and 0.04 % with 8,
-#: by 1.0, 0.2, 0.1 and 0.03 % with 4, and by 2.4, 0.6, 0.8 and 0.5 % without smaller triangles.
-LINE_PARTS = 8
 #: Relative round-off of a distance.
 ROUND_OFF = 1e-9
 #: Tangent of the least angle closer to the line, over tan(angle). A converged surface is steeper.

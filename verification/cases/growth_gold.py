@@ -26,20 +26,19 @@ AIMS = {"length": {"fast": 4e-3, "accurate": 1.5e-3, "exact": 5e-4}, "tip": dict
 #: The largest bar of a reference that judges, over the aim.
 SHARE = 0.25
 #: Largest errors that are accepted where an aim is missed, by kind of states, number and preset; measured errors of
-#: `fast`, `accurate` and `exact` on 2026-11-29 in comments. Runs with other last bits have other meshes, so the limits
-#: are about one and a half times as large. No limit says that a preset is good: the aims say that.
+#: `fast`, `accurate` and `exact` on 2026-11-30 in comments. Runs with other last bits have other meshes, so the limits
+#: are one and a half times as large or more. No limit says that a preset is good: the aims say that.
 #: The first state is just after contact, when the length of contact is 7.6 um. At theta = 148 the traction is a tenth
-#: of that at first contact, and depends on the length of contact most. Until stresses had triangles of their own, they
-#: erred by 27 (theta 120) and 95 % (theta 148) in `fast`, and on bonded walls by 51, 55 and 33 % with R = 45 um.
+#: of that at first contact, and depends on the length of contact most. Until steps had small triangles at the lines,
+#: lengths erred by 2.4, 0.94 and 0.16 %. Until stresses had triangles of their own, they erred by 27 (theta 120) and
+#: 95 % (theta 148) in `fast`, and on bonded walls by 51, 55 and 33 % with R = 45 um.
 ACCEPTED: dict[str, dict[str, dict[str, float]]] = {
     "touching": {
-        "length": {"fast": 0.035, "accurate": 0.0145, "exact": 0.0025},  # 2.4, 0.94, 0.16 %
-        "tip": {"fast": 6e-4},  # 0.039 %; accurate has 0.013, exact 0.005
-        "wall_traction": {"fast": 1.45, "accurate": 0.13, "exact": 0.22},  # 98, 8.5, 14 %
-        "tensile_stress": {"fast": 0.13}},  # 8.3 %; accurate has 0.80
+        "length": {"fast": 8e-3, "accurate": 5e-3, "exact": 2.5e-3},  # 0.53, 0.28, 0.21 %; later 0.25, 0.13, 0.02 %
+        "wall_traction": {"fast": 1.1, "accurate": 0.05, "exact": 0.08}},  # 74, 3.3, 4.8 %
     "bonded": {
         "tip": {"fast": 3e-3, "accurate": 2e-3, "exact": 1.1e-3}}}  # 0.19, 0.14, 0.071 %
-CAUSE = {"touching": "elements and new meshes at the lines", "bonded": "elements at the edges of the wall"}
+CAUSE = {"touching": "elements and new meshes at the lines, just after contact and late", "bonded": "elements at the edges of the wall"}
 #: (number, theta, preset) that the reference cannot judge: near the edge of a bonded wall its surface turns over.
 NOT_JUDGED = {("wall_traction", 1.15, "exact")}
 WIDTH = 50.0
