@@ -316,7 +316,8 @@ def test_lines_have_small_triangles_where_they_go(plugged):
         assert ends.sum() == 2 and outline.corners.edge_lengths().min() < 0.3
         assert shape.position.shape == pore.mesh.points.shape
         assert np.abs(shape.position - coarse.position)[pore.mesh.body].max() < 0.3
-        assert shape.amounts(pore.active, pore).sum() == pytest.approx(pore.active.sum(), rel=1e-12)
+        assert shape.pore.active.sum() == pytest.approx(pore.active.sum(), rel=1e-12)
+        assert shape.pore.inert.sum() == pytest.approx(pore.inert.sum(), rel=1e-12)
 
 
 def test_the_triangles_of_the_mesh_take_over_from_the_small_ones(plugged, monkeypatch):

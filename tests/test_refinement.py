@@ -104,23 +104,25 @@ def test_parts_keep_nodes_and_share_amounts(order, seeds):
     assert bisection.restricted(bisection.nodal(field)) == pytest.approx(field, abs=1e-12)
     table = pore.bodies[0].solid.shape.table
     corners = 2 + np.random.default_rng(6).random((len(pore.mesh.triangles), 3))
-    constants = corners if order == 2 else corners[:, :1] * np.ones(3)
+    linear = corners if order == 2 else corners[:, :1] * np.ones(3)
 
-    def amounts(mesh, owner, local):
+    def densities(mesh, owner, local):
         places = np.einsum("qc,tci->tqi", table.linear, local)
         at = np.stack([1 - places.sum(axis=2), *np.moveaxis(places, 2, 0)], axis=2)
-        areas = np.abs(np.linalg.det(local[:, 1:] - local[:, :1]))[:, None]
-        every = areas * table.weights * np.einsum("tqc,tc->tq", at, constants[owner])
+        every = np.einsum("tqc,tc->tq", at, linear[owner])
         return [every[region.triangles] for region in mesh.regions]
 
     unit = np.tile(elements.nodes(1), (len(corners), 1, 1))
-    shared = bisection.of_each(amounts(pore.mesh, np.arange(len(corners)), unit), table)
-    expected = amounts(fine.mesh, bisection.owner, bisection.local)
-    for computed, exact in zip(shared, expected, strict=True):
-        limits = exact.min() * 0.6, exact.max() * 1.5
-        assert computed == pytest.approx(exact, rel=0.35) and limits[0] < computed.min() < computed.max() < limits[1]
-        assert computed.sum() == pytest.approx(exact.sum(), rel=1e-12)
-        assert np.median(np.abs(computed / exact - 1)) < 2e-3
+    weights, own = ([body.solid.at.dx for body in of.bodies] for of in (pore, fine))
+    before = [density * dx for density, dx in zip(densities(pore.mesh, np.arange(len(corners)), unit), weights)]
+    shared = bisection.of_each(before, weights, own, table)
+    expected = densities(fine.mesh, bisection.owner, bisection.local)
+    for computed, dx, exact, total in zip(shared, own, expected, before, strict=True):
+        assert computed / dx == pytest.approx(exact, rel=0.35)
+        assert np.median(np.abs(computed / dx / exact - 1)) < 2e-3
+        assert computed.sum() == pytest.approx(total.sum(), rel=1e-12)
+    for computed, dx in zip(bisection.of_each([3 * dx for dx in weights], weights, own, table), own, strict=True):
+        assert computed == pytest.approx(3 * dx, rel=1e-10)
 
 
 def test_a_mesh_with_other_triangles_does_not_move_with_the_aggregate(monkeypatch):

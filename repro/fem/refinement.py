@@ -61,27 +61,28 @@ class Bisection:
         at[self.parent.cells[self.owner[part], place]] = self.mesh.cells[part, node]
         return values[at]
 
-    def of_each(self, amounts: Sequence[np.ndarray], table: Table) -> list[np.ndarray]:
+    def of_each(self, amounts: Sequence[np.ndarray], weights: Sequence[np.ndarray],
+                own: Sequence[np.ndarray], table: Table) -> list[np.ndarray]:
         """Amounts (t, q) at the points of the parts, aggregate by aggregate, from those in the
         triangles of the parent.
 
-        The amount per area of the unit triangle is the linear function that fits the values of a
-        triangle best, limited to their range. The parts of a triangle keep its sum.
+        The amount over its weight is the linear function that fits the values of a triangle best,
+        limited to their range. The parts of a triangle keep its sum. weights: (t, q) in the parent;
+        own: (t, q) in the parts; table: functions at the points of a triangle.
         """
-        return [self._split(amount, before, after, table) for amount, before, after
-                in zip(amounts, self.parent.regions, self.mesh.regions, strict=True)]
+        return [self._split(amount, weight, own_weight, before, after, table)
+                for amount, weight, own_weight, before, after in zip(
+                    amounts, weights, own, self.parent.regions, self.mesh.regions, strict=True)]
 
-    def _split(self, amount: np.ndarray, before: Region, after: Region,
-               table: Table) -> np.ndarray:
+    def _split(self, amount: np.ndarray, weight: np.ndarray, own: np.ndarray, before: Region,
+               after: Region, table: Table) -> np.ndarray:
         row = np.searchsorted(before.triangles, self.owner[after.triangles])
-        local = self.local[after.triangles]
-        density = amount / table.weights
-        places = elements.values(1, _within(local, table.linear[:, 1:]).reshape(-1, 2))
-        fitted = np.einsum("tqc,tc->tq", places.reshape(*local.shape[:1], -1, 3),
-                           (density @ elements.linear_fit(table).T)[row])
+        density = amount / weight
+        local = _within(self.local[after.triangles], table.linear[:, 1:])
+        places = elements.values(1, local.reshape(-1, 2)).reshape(*local.shape[:2], 3)
+        fitted = np.einsum("tqc,tc->tq", places, (density @ elements.linear_fit(table).T)[row])
         limits = density.min(axis=1)[row, None], density.max(axis=1)[row, None]
-        share = elements.determinant(local[:, 1:] - local[:, :1])[:, None]
-        parts = share * table.weights * np.clip(fitted, *limits)
+        parts = own * np.clip(fitted, *limits)
         totals = np.bincount(row, parts.sum(axis=1))
         scale = np.divide(amount.sum(axis=1), totals, out=np.ones_like(totals), where=totals > 0)
         return parts * scale[row, None]

@@ -132,16 +132,16 @@ def _lines_after(grown: Pore, advances: Advances) -> np.ndarray:
 def _with_finer_lines(grown: Pore, theta: Sequence[np.ndarray], lines: np.ndarray,
                       size: float) -> tuple[Pore, list[np.ndarray], Bisection]:
     """A grown pore and its theta on triangles of a size (um) beside points (K, 2) um."""
-    fine, bisection = with_finer_lines(grown, lines, size, LINE_GRADATION)
-    table = grown.space.table
-    active, inert, expanded = [
-        bisection.of_each(amounts, table) for amounts in (
-            [body.active for body in grown.bodies], [body.inert for body in grown.bodies],
-            [each * body.solid.at.dx for body, each in zip(grown.bodies, theta)])]
-    bodies = tuple(replace(body, active=first, inert=second)
-                   for body, first, second in zip(fine.bodies, active, inert))
-    theta = [amount / body.solid.at.dx for body, amount in zip(bodies, expanded)]
-    return replace(fine, bodies=bodies), theta, bisection
+    bodies = [replace(body, theta=each) for body, each in zip(grown.bodies, theta)]
+    fine, bisection = with_finer_lines(replace(grown, bodies=tuple(bodies)), lines, size,
+                                       LINE_GRADATION)
+    weights, own = ([pore.of(region, pore.space.reaction.dx) for region in pore.mesh.regions]
+                    for pore in (grown, fine))
+    masses = [bisection.of_each(amounts, weights, own, grown.space.table) for amounts in (
+        [body.active for body in bodies], [body.inert for body in bodies])]
+    fine = replace(fine, bodies=tuple(replace(body, active=active, inert=inert)
+                                      for body, active, inert in zip(fine.bodies, *masses)))
+    return fine, [body.theta for body in fine.bodies], bisection
 
 
 def _expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], start: Pore,

@@ -25,8 +25,12 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
     bisection = refined(pore.mesh, pore.outlines, size_at)
     space = Space(bisection.mesh)
     origin = bisection.nodal(pore.origin)
-    expanded = bisection.of_each([body.theta * body.solid.at.dx for body in pore.bodies],
-                                 pore.bodies[0].solid.shape.table)
+    solids = [material(space, region, origin[region.nodes], body.solid.energy)
+              for body, region in zip(pore.bodies, bisection.mesh.regions)]
+    weights = [body.solid.at.dx for body in pore.bodies]
+    own = [solid.at.dx for solid in solids]
+    expanded = bisection.of_each([body.theta * dx for body, dx in zip(pore.bodies, weights)],
+                                 weights, own, pore.bodies[0].solid.shape.table)
     none = np.empty((0, 0))
     bodies = []
     for number, (body, region, outline) in enumerate(zip(pore.bodies, bisection.mesh.regions,
@@ -37,10 +41,9 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
                   ) -> np.ndarray:
             return bisection.nodal(seen.mesh.from_region(seen.region, positions))[nodes]
 
-        solid = material(space, region, origin[region.nodes], body.solid.energy)
         bodies.append(replace(body, wall=outline.wall, fixed=outline.fixed, active=none,
-                              inert=none, solid=solid,
-                              theta=expanded[number] / solid.at.dx,
+                              inert=none, solid=solids[number],
+                              theta=expanded[number] / own[number],
                               configuration=body.configuration.carried(carry)))
     fine = replace(pore, space=space, bodies=tuple(bodies), concentrations=None,
                    pressure=bisection.at_corners(pore.pressure))

@@ -85,10 +85,8 @@ class Expansion:
 
     def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
         """Carry amounts (r, q) from the points of the grown pore's aggregates to those of the new
-        shapes."""
+        shapes, without a bisection."""
         parts = [grown.of(region, amounts) for region in grown.mesh.regions]
-        if self.bisection:
-            parts = self.bisection.of_each(parts, grown.space.table)
         for division in self.divisions:
             parts[division.number] = division.amounts(parts[division.number], grown.space.table)
         return self.pore.joined(parts)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from repro.results.tables import Results
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Law:
     """A law of K / K0, which takes B and the constants.
 

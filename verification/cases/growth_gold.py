@@ -38,7 +38,8 @@ ACCEPTED: dict[str, dict[str, dict[str, float]]] = {
         "wall_traction": {"fast": 1.1, "accurate": 0.05, "exact": 0.08}},  # 74, 3.3, 4.8 %
     "bonded": {
         "tip": {"fast": 3e-3, "accurate": 2e-3, "exact": 1.1e-3}}}  # 0.19, 0.14, 0.071 %
-CAUSE = {"touching": "elements and new meshes at the lines, just after contact and late", "bonded": "elements at the edges of the wall"}
+CAUSE = {"touching": "elements and new meshes at the lines, just after contact and late",
+         "bonded": "elements at the edges of the wall"}
 #: (number, theta, preset) that the reference cannot judge: near the edge of a bonded wall its surface turns over.
 NOT_JUDGED = {("wall_traction", 1.15, "exact")}
 WIDTH = 50.0

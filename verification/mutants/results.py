@@ -1225,7 +1225,8 @@ MUTANTS = (
          "_refuse",
          "scene.pore.whole_width == scene.pore.width",
          "True",
-         f"{OWN}a_scene_of_another_form_or_without_a_part_is_refused[changes1-one viscous aggregate between two walls]"),
+         f"{OWN}a_scene_of_another_form_or_without_a_part_is_refused[changes1-"
+         "one viscous aggregate between two walls]"),
         ("own-law-uptakes-exchanged",
          "A state has the uptake of the donor for that of the acceptor.",
          "_state",
