@@ -19,11 +19,10 @@ from repro.fem.walls import FREE, Walls, numbered, whole_width, width_between
 ACROSS_PORE = 14.0
 ACROSS_AGGREGATE = 10.0
 ACROSS_FILM = 10.0
-#: Least film, and size beside the contact lines of a new mesh, over the size where a step ends. In
-#: ``fast`` lengths of contact err by 0.5, 0.02, 0.06 and 0.25 % with an eighth of the film, by 1.0,
-#: 0.2, 0.15 and 0.02 % with a quarter, and by 2.4, 0.6, 0.8 and 0.5 % without smaller triangles
-#: (``growth-gold-contact``). Smaller ones in ``accurate`` double the time after contact.
-PARTS_OF_FILM = 8.0
+#: Size beside the contact lines of a new mesh, over the size where a step ends. In ``fast`` lengths
+#: of contact err by 1.0, 0.2, 0.15 and 0.02 % with 4, by 0.5, 0.02, 0.06 and 0.25 % with 8, and by
+#: 2.4, 0.6, 0.8 and 0.5 % without smaller triangles (``growth-gold-contact``). With 8 the time in
+#: contact doubles.
 PARTS_OF_CONTACT = 4.0
 #: Limit on the elements along the interface, at refinement 1, that follow from the thickness. A
 #: half-disc has 31; a body more than 60 times longer than thick reaches the limit. With 200 or 400
@@ -79,9 +78,7 @@ class Sizing:
     def moving_lines(self) -> float:
         """Size (um) beside the contact lines with the opposite wall where a step ends; infinite if
         they have no size of their own."""
-        if self.contact == inf:
-            return inf
-        return min(self.film / PARTS_OF_FILM, self.contact / PARTS_OF_CONTACT)
+        return self.contact / PARTS_OF_CONTACT
 
     @property
     def largest(self) -> float:
