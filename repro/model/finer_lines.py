@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from repro.fem.mesh import Mesh
 from repro.fem.refinement import Bisection, refined
 from repro.fem.space import Space
 from repro.model.pore import Pore
-from repro.model.solid import material
+from repro.model.solid import Solid, material
 
 
 def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
@@ -27,10 +29,11 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
     origin = bisection.nodal(pore.origin)
     solids = [material(space, region, origin[region.nodes], body.solid.energy)
               for body, region in zip(pore.bodies, bisection.mesh.regions)]
-    weights = [body.solid.at.dx for body in pore.bodies]
-    own = [solid.at.dx for solid in solids]
-    expanded = bisection.of_each([body.theta * dx for body, dx in zip(pore.bodies, weights)],
-                                 weights, own, pore.bodies[0].solid.shape.table)
+    # theta over J is smooth, and does not depend on the reference.
+    expanded = bisection.of_each([body.theta * body.solid.at.dx for body in pore.bodies],
+                                 _present_dx(pore.mesh, [body.solid for body in pore.bodies]),
+                                 _present_dx(space.mesh, solids),
+                                 pore.bodies[0].solid.shape.table)
     none = np.empty((0, 0))
     bodies = []
     for number, (body, region, outline) in enumerate(zip(pore.bodies, bisection.mesh.regions,
@@ -43,8 +46,14 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
 
         bodies.append(replace(body, wall=outline.wall, fixed=outline.fixed, active=none,
                               inert=none, solid=solids[number],
-                              theta=expanded[number] / own[number],
+                              theta=expanded[number] / solids[number].at.dx,
                               configuration=body.configuration.carried(carry)))
     fine = replace(pore, space=space, bodies=tuple(bodies), concentrations=None,
                    pressure=bisection.at_corners(pore.pressure))
     return fine, bisection
+
+
+def _present_dx(mesh: Mesh, solids: Sequence[Solid]) -> list[np.ndarray]:
+    """(t, q) um2 of each aggregate, areas of the points of growth in the present shape."""
+    return [solid.at.dx * solid.strained(mesh.points[region.nodes]).J
+            for solid, region in zip(solids, mesh.regions)]
