@@ -14,7 +14,7 @@ import numpy as np
 
 from repro.fem import elements
 from repro.fem.elements import Table
-from repro.fem.mesh import Mesh, Region, curved
+from repro.fem.mesh import Mesh, curved
 from repro.fem.outline import Outline
 from repro.fem.sizing import SPLIT, placed
 from repro.fem.transfer import Located
@@ -54,38 +54,45 @@ class Bisection:
 
     def restricted(self, values: np.ndarray) -> np.ndarray:
         """(N, ...) values at the parent's nodes, from those at the nodes of the parts."""
-        where = _within(self.local, elements.nodes(self.mesh.geometry))
-        distance = np.abs(where[:, :, None] - elements.nodes(self.mesh.geometry)).max(axis=3)
-        part, node, place = np.nonzero(distance < ROUND_OFF)
-        at = np.empty(len(self.parent.points), int)
-        at[self.parent.cells[self.owner[part], place]] = self.mesh.cells[part, node]
-        return values[at]
+        return values[self._parent_nodes]
 
     def of_each(self, amounts: Sequence[np.ndarray], weights: Sequence[np.ndarray],
-                own: Sequence[np.ndarray], table: Table) -> list[np.ndarray]:
-        """Amounts (t, q) at the points of the parts, aggregate by aggregate, from those in the
-        triangles of the parent.
+                part_weights: Sequence[np.ndarray], table: Table) -> list[np.ndarray]:
+        """Amounts at the points of the parts of each aggregate, from those in its triangles.
 
-        The amount over its weight is the linear function that fits the values of a triangle best,
-        limited to their range. The parts of a triangle keep its sum. weights: (t, q) in the parent;
-        own: (t, q) in the parts; table: functions at the points of a triangle.
+        In a triangle, the amount over its weight is replaced by the linear function that fits it
+        best, limited to its range. The parts of a triangle keep its sum.
+
+        amounts, weights: (t, q) of each aggregate in the parent; part_weights: (t, q) of each in
+        the parts; table: functions at the points of a triangle.
         """
-        return [self._split(amount, weight, own_weight, before, after, table)
-                for amount, weight, own_weight, before, after in zip(
-                    amounts, weights, own, self.parent.regions, self.mesh.regions, strict=True)]
+        each = zip(amounts, weights, part_weights, strict=True)
+        return [self._split(number, *one, table) for number, one in enumerate(each)]
 
-    def _split(self, amount: np.ndarray, weight: np.ndarray, own: np.ndarray, before: Region,
-               after: Region, table: Table) -> np.ndarray:
-        row = np.searchsorted(before.triangles, self.owner[after.triangles])
+    def _split(self, number: int, amount: np.ndarray, weight: np.ndarray,
+               part_weight: np.ndarray, table: Table) -> np.ndarray:
+        """:meth:`of_each` of one aggregate, by its place in the list."""
+        triangles = self.mesh.regions[number].triangles
+        row = np.searchsorted(self.parent.regions[number].triangles, self.owner[triangles])
         density = amount / weight
-        local = _within(self.local[after.triangles], table.linear[:, 1:])
+        local = _within(self.local[triangles], table.linear[:, 1:])
         places = elements.values(1, local.reshape(-1, 2)).reshape(*local.shape[:2], 3)
         fitted = np.einsum("tqc,tc->tq", places, (density @ elements.linear_fit(table).T)[row])
         limits = density.min(axis=1)[row, None], density.max(axis=1)[row, None]
-        parts = own * np.clip(fitted, *limits)
+        parts = part_weight * np.clip(fitted, *limits)
         totals = np.bincount(row, parts.sum(axis=1))
         scale = np.divide(amount.sum(axis=1), totals, out=np.ones_like(totals), where=totals > 0)
         return parts * scale[row, None]
+
+    @cached_property
+    def _parent_nodes(self) -> np.ndarray:
+        """(N,) numbers, among the nodes of the parts, of the parent's nodes."""
+        nodes = elements.nodes(self.mesh.geometry)
+        distance = np.abs(_within(self.local, nodes)[:, :, None] - nodes).max(axis=3)
+        part, node, place = np.nonzero(distance < ROUND_OFF)
+        numbers = np.empty(len(self.parent.points), int)
+        numbers[self.parent.cells[self.owner[part], place]] = self.mesh.cells[part, node]
+        return numbers
 
     @cached_property
     def _nodes(self) -> Located:

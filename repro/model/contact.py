@@ -11,6 +11,7 @@ contact lines lie anywhere on an arc (:mod:`repro.model.closing_by_lines`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import inf
 
@@ -29,8 +30,8 @@ from repro.model.pore import Pore
 
 #: By the geometry of the triangles.
 CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
-#: Largest number of equilibria with small triangles beside contact lines, where the last one had
-#: these lines.
+#: Largest number of equilibria on small triangles. After each one, the triangles are small where it
+#: has placed the lines.
 PREDICTIONS = 3
 #: Largest distance of a line from its expected place, over the size of the triangles there. At that
 #: distance they are five times as large.
@@ -85,31 +86,23 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     acceleration therefore chooses the forces of a round. After the first contact the film's
     thickness counts under the forces of the open pore, because a closed pore has larger forces.
 
-    With ``search.line_size`` the triangles beside contact lines with the opposite wall are
-    bisected where ``search.advances`` expects the lines. If there is no equilibrium on these
-    triangles, that on the triangles of the mesh takes its place.
+    If ``search.line_size`` is finite, triangles are bisected where ``search.advances`` expects the
+    contact lines with the opposite wall. If there is no equilibrium on them, the result is the
+    equilibrium on the mesh.
     """
     start = guess or grown
-    if search.line_size < inf:
-        try:
-            resolved = _with_small_triangles(mechanics, grown, theta, start, search)
-        except GrowthError:
-            resolved = None
-        if resolved:
-            return resolved
+    if search.line_size < inf and len(_lines_after(grown, search.advances)):
+        with suppress(GrowthError):
+            return _on_small_triangles(mechanics, grown, theta, start, search)
     return _expand(mechanics, grown, theta, start, search)
 
 
-def _with_small_triangles(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
-                          start: Pore, search: SearchOptions) -> Expansion | None:
-    """:func:`expand` on small triangles beside the contact lines with opposite walls; None if there
-    are no such lines whose advance is expected."""
-    shape = None
+def _on_small_triangles(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
+                        start: Pore, search: SearchOptions) -> Expansion:
+    """:func:`expand` on small triangles beside the contact lines with opposite walls."""
     for _ in range(PREDICTIONS):
         lines = _lines_after(grown, search.advances)
-        if not len(lines):
-            break
-        fine, fine_theta, bisection = _with_finer_lines(grown, theta, lines, search.line_size)
+        fine, fine_theta, bisection = _bisected(grown, theta, lines, search.line_size)
         shape = _expand(mechanics, fine, fine_theta, divided_start(start, fine, bisection), search)
         shape = replace(shape, bisection=bisection)
         missed = [abs(length - search.advances[key]) for key, length in shape.advances.items()]
@@ -120,8 +113,8 @@ def _with_small_triangles(mechanics: Mechanics, grown: Pore, theta: Sequence[np.
 
 
 def _lines_after(grown: Pore, advances: Advances) -> np.ndarray:
-    """(K, 2) um, points of the grown outlines at contact lines with opposite walls that have
-    advanced; none where no line has."""
+    """(K, 2) um, the points of the grown outlines where contact lines with opposite walls are
+    expected after their advances; empty without such lines."""
     lines = [(outline, line, advances[number, *line.key])
              for number, outline in enumerate(grown.outlines)
              for line in contact_lines.lines_of(outline)
@@ -129,15 +122,16 @@ def _lines_after(grown: Pore, advances: Advances) -> np.ndarray:
     return np.array([contact_lines.point_at(*each) for each in lines])
 
 
-def _with_finer_lines(grown: Pore, theta: Sequence[np.ndarray], lines: np.ndarray,
-                      size: float) -> tuple[Pore, list[np.ndarray], Bisection]:
-    """A grown pore and its theta on triangles of a size (um) beside points (K, 2) um."""
+def _bisected(grown: Pore, theta: Sequence[np.ndarray], lines: np.ndarray,
+              size: float) -> tuple[Pore, list[np.ndarray], Bisection]:
+    """A grown pore with its masses, and its theta, on triangles of a size (um) beside points (K, 2)
+    um."""
     bodies = [replace(body, theta=each) for body, each in zip(grown.bodies, theta)]
     fine, bisection = with_finer_lines(replace(grown, bodies=tuple(bodies)), lines, size,
                                        LINE_GRADATION)
-    weights, own = ([pore.of(region, pore.space.reaction.dx) for region in pore.mesh.regions]
-                    for pore in (grown, fine))
-    masses = [bisection.of_each(amounts, weights, own, grown.space.table) for amounts in (
+    weights, part_weights = ([pore.of(region, pore.space.reaction.dx)
+                              for region in pore.mesh.regions] for pore in (grown, fine))
+    masses = [bisection.of_each(amounts, weights, part_weights, grown.space.table) for amounts in (
         [body.active for body in bodies], [body.inert for body in bodies])]
     fine = replace(fine, bodies=tuple(replace(body, active=active, inert=inert)
                                       for body, active, inert in zip(fine.bodies, *masses)))

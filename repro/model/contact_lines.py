@@ -75,7 +75,7 @@ class SearchOptions:
     least film; stationary: do lines stay at their first trial, and nodes on the start's walls;
     patient: is a failed equilibrium tried again in smaller parts; advances: {(number, wall,
     direction): um} of the first trial, along the outline of an aggregate, by its place in the list;
-    line_size: um, of the triangles beside the lines with the opposite wall, infinite for those of
+    line_size: um, size of the triangles beside the lines with the opposite wall; infinite: that of
     the mesh.
     """
 

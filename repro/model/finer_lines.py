@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.fem.mesh import Mesh
+from repro.fem.mesh import Mesh, Region
 from repro.fem.refinement import Bisection, refined
 from repro.fem.space import Space
 from repro.model.pore import Pore
@@ -16,10 +16,10 @@ from repro.model.solid import Solid, material
 
 def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
                      gradation: float) -> tuple[Pore, Bisection]:
-    """The aggregates in the same shapes, with triangles of a size (um) beside points (K, 2) um.
+    """Bisect the triangles beside points (K, 2) um, down to a size (um); the shapes stay.
 
-    The size grows by ``gradation`` times the distance from the points. Only the mesh changes, by
-    bisection. The result has neither masses nor substrates.
+    The size grows by ``gradation`` times the distance from the points. The result has neither
+    masses nor substrates.
     """
     def size_at(where: np.ndarray) -> np.ndarray:
         return size + gradation * np.linalg.norm(where[:, None] - lines, axis=2).min(axis=1)
@@ -28,7 +28,7 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
     space = Space(bisection.mesh)
     origin = bisection.nodal(pore.origin)
     solids = [material(space, region, origin[region.nodes], body.solid.energy)
-              for body, region in zip(pore.bodies, bisection.mesh.regions)]
+              for body, region in zip(pore.bodies, space.mesh.regions)]
     # theta over J is smooth, and does not depend on the reference.
     expanded = bisection.of_each([body.theta * body.solid.at.dx for body in pore.bodies],
                                  _present_dx(pore.mesh, [body.solid for body in pore.bodies]),
@@ -36,17 +36,15 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
                                  pore.bodies[0].solid.shape.table)
     none = np.empty((0, 0))
     bodies = []
-    for number, (body, region, outline) in enumerate(zip(pore.bodies, bisection.mesh.regions,
-                                                         bisection.outlines)):
-        seen = pore.focused(number)
-
-        def carry(positions: np.ndarray, seen: Pore = seen, nodes: np.ndarray = region.nodes,
-                  ) -> np.ndarray:
-            return bisection.nodal(seen.mesh.from_region(seen.region, positions))[nodes]
+    for body, before, after, outline, solid, amount in zip(
+            pore.bodies, pore.mesh.regions, space.mesh.regions, bisection.outlines, solids,
+            expanded):
+        def carry(positions: np.ndarray, before: Region = before,
+                  after: Region = after) -> np.ndarray:
+            return bisection.nodal(pore.mesh.from_region(before, positions))[after.nodes]
 
         bodies.append(replace(body, wall=outline.wall, fixed=outline.fixed, active=none,
-                              inert=none, solid=solids[number],
-                              theta=expanded[number] / solids[number].at.dx,
+                              inert=none, solid=solid, theta=amount / solid.at.dx,
                               configuration=body.configuration.carried(carry)))
     fine = replace(pore, space=space, bodies=tuple(bodies), concentrations=None,
                    pressure=bisection.at_corners(pore.pressure))
@@ -54,6 +52,6 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
 
 
 def _present_dx(mesh: Mesh, solids: Sequence[Solid]) -> list[np.ndarray]:
-    """(t, q) um2 of each aggregate, areas of the points of growth in the present shape."""
+    """(t, q) um2 of each aggregate: the present areas of the points where growth is integrated."""
     return [solid.at.dx * solid.strained(mesh.points[region.nodes]).J
             for solid, region in zip(solids, mesh.regions)]

@@ -58,8 +58,8 @@ class Expansion:
     at a wall that it does not touch, this film in the old and in the new shape before films close;
     divisions: one after the other, for each aggregate with lines within arcs; advances: {(number,
     wall, direction): um} by which contact lines of an aggregate, by its place in the list, have
-    advanced along its grown outline; bisection: of the grown pore's mesh before it was divided,
-    None if its triangles were small enough.
+    advanced along its grown outline; bisection: of the grown pore's mesh, before the divisions;
+    None if no triangle is bisected.
     """
 
     pore: Pore
@@ -85,15 +85,15 @@ class Expansion:
 
     def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
         """Carry amounts (r, q) from the points of the grown pore's aggregates to those of the new
-        shapes, without a bisection."""
+        shapes. For expansions without a bisection."""
         parts = [grown.of(region, amounts) for region in grown.mesh.regions]
         for division in self.divisions:
             parts[division.number] = division.amounts(parts[division.number], grown.space.table)
         return self.pore.joined(parts)
 
     def gathered(self, loads: np.ndarray) -> np.ndarray:
-        """(n, 2) loads on the nodes of the grown aggregates, from those on the new shapes' nodes,
-        without a bisection."""
+        """(n, 2) loads on the nodes of the grown aggregates, from those on the new shapes' nodes.
+        For expansions without a bisection."""
         mesh = self.pore.mesh
         nodal = mesh.from_body(loads)
         for division in self.divisions[::-1]:

@@ -56,7 +56,7 @@ SLOWEST, LEAST_SUPPLY = 1e-4, 0.01
 LENGTH, APART, LARGEST = 15.0, 1.2, 4.5
 #: Largest change of the fit's unknowns, ln of factors and exponents, and most evaluations: few
 #: states may leave a constant undetermined. With twice the change, or with 20 to 200 evaluations,
-#: the bounds of two scenes change by less than a percent.
+#: the bound of a scene changes by less than 0.3 %.
 SPREAD, MOST_FITS = 2.0, 40
 #: The bound is the largest error of the fit, over the spread of the bound, times this factor, as
 #: for Table 1.
