@@ -12,9 +12,13 @@ from repro import results
 from repro.errors import GrowthError, RunEnd
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.ends import CLOSE, Event, Reached, Strength, _detachment, locate
+from repro.march.folding import fold_message, most_compressed
+from repro.march.state import Compression
 from repro.model.adhesion import Peak
+from repro.model.configuration import FromPrevious
 from repro.model.energies.neo_hookean import BIOT
-from repro.runs.status import is_over
+from repro.model.meshing import seeded
+from repro.runs.status import is_fold, is_over
 from tests.test_fold import SETS as PLUG
 from verification.problems.schemes import exchange, load_scene
 
@@ -92,6 +96,29 @@ def test_every_end_is_located_within_its_step(name, scheme):
     assert TIMES[0] < time < case.end
     assert [ledger.start for ledger in ledgers] == pytest.approx([0.0, *(ledger.end for ledger in ledgers[:-1])])
     assert ledgers[-1].end == pytest.approx(time, abs=1e-9)
+
+
+@pytest.mark.parametrize("side, position", [("upstream", "-91.3 um"), ("downstream", "91.3 um")])
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_pores_end_names_the_aggregate(side, position, order):
+    """One of two aggregates, whatever its place in the list, reaches the pore's end; its status is that of an end."""
+    seeds = [f'{{radius="5 um", position="{position}", name="far"}}', '{radius="5 um", wall="upper"}'][::order]
+    changes = (*COARSE, "pore.length=200 um", f"aggregate=[{', '.join(seeds)}]")
+    *_, status = rows_of(load_scene("base", changes))
+    assert status.startswith(f"aggregate far reaches the pore's {side} end at t = ") and is_over(status)
+
+
+@pytest.mark.parametrize("number, name", [(0, "one"), (1, "two")])
+def test_a_fold_names_the_aggregate(number, name):
+    """The material of one of two seeds was twice as long: its surface is compressed. The fold's status is that of an
+    end."""
+    seeds = 'aggregate=[{radius="5 um", name="one"}, {radius="5 um", wall="upper", name="two"}]'
+    pore = seeded(load_scene("base", [*COARSE, seeds])).focused(number)
+    longer = FromPrevious(pore.body.reference * [2.0, 1.0])
+    compression = most_compressed(Compression(), pore.with_body(configuration=longer))
+    assert compression.stretch < 0.8
+    status = fold_message("at t = 3 h", compression)
+    assert status.startswith(f"aggregate {name}'s surface folds at t = 3 h: ") and is_fold(status)
 
 
 def test_rows_before_an_end_are_those_of_the_full_step():

@@ -241,7 +241,7 @@ def _extents(outline: Outline) -> tuple[float, float, float]:
 def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
     """All ends that the scene models."""
     for side in ("upstream", "downstream"):
-        nearest = name_of(pore, farthest(pore, side)) if pore.bodies else ""
+        nearest = pore.name_of(farthest(pore, side)) if pore.bodies else ""
         end = PoreEnd(f"{nearest} reaches the pore's {side} end at t = {pore.time:g} h")
         yield Event(1 - elements_to_end(ends.channel, pore, side), end)
     if pore.accumulates and pore.biot > 0:
@@ -267,7 +267,7 @@ def _eroded(least: float, pore: Pore) -> Iterator[Event]:
     for number, (body, outline) in enumerate(zip(pore.bodies, pore.outlines)):
         own, *_ = body.seat.walls(pore.mesh.walls)
         extent = min(outline.thickness, outline.contact_length(own))
-        end = Detachment(f"{name_of(pore, number)} is eroded at t = {pore.time:g} h: its thickness "
+        end = Detachment(f"{pore.name_of(number)} is eroded at t = {pore.time:g} h: its thickness "
                          f"or contact is {extent:.4g} um, below growth.minimum_film")
         yield Event(least / extent - 1, end, None if body.spans else number)
 
@@ -292,17 +292,11 @@ def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: s
     """The event of a strength; its message has the stress in the unit that the scene gives."""
     stated = strength.stated
     ratio = peak.value / strength.stress
-    end = Detachment(f"{name_of(pore, number)} {verb} at t = {pore.time:g} h: near x = "
+    end = Detachment(f"{pore.name_of(number)} {verb} at t = {pore.time:g} h: near x = "
                      f"{peak.x:.4g}, y = {peak.y:.4g} um {subject} {ratio * stated.number:.3g} "
                      f"{stated.unit}, in the mean over pore.width / 20; growth.{strength.key} is "
                      f"{stated.text}")
     return Event(ratio - 1, end, leaves)
-
-
-def name_of(pore: Pore, number: int) -> str:
-    """An aggregate in messages, by its place in the list."""
-    name = pore.bodies[number].name
-    return "the aggregate" if len(pore.bodies) == 1 and name == "1" else f"aggregate {name}"
 
 
 def farthest(pore: Pore, side: str) -> int:
@@ -333,7 +327,7 @@ def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
             raise Meeting(f"{pair} meet in the step from t = {previous.time:g} h")
     for side in ("upstream", "downstream"):
         if elements_to_end(channel, expanded, side) < LEAST_ELEMENTS:
-            nearest = name_of(expanded, farthest(expanded, side))
+            nearest = expanded.name_of(farthest(expanded, side))
             raise PoreEnd(f"{nearest} reaches the pore's {side} end in the step from "
                           f"t = {previous.time:g} h")
 

@@ -16,7 +16,7 @@ from repro.errors import GrowthError, MeshError, RunEnd
 from repro.march.state import Compression
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.pore import Pore
-from repro.model.surface import least_stretched
+from repro.model.surface import surfaces
 
 #: The surface folds if no equilibrium exists and its stretch has been below this, 5 % above CREASE:
 #: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.677 (docs/design.md).
@@ -51,10 +51,10 @@ def most_compressed(earlier: Compression, pore: Pore) -> Compression:
     """
     if not any(body.solid.energy.crease for body in pore.bodies):
         return earlier
-    present = least_stretched(pore)
+    number, present = min(enumerate(surfaces(pore)), key=lambda each: each[1].least)
     if pore.accumulates and present.least >= earlier.stretch:
         return earlier
-    return Compression(present.least, *present.place, pore.time)
+    return Compression(present.least, *present.place, pore.time, pore.name_of(number))
 
 
 def refuse_fold(expanded: Pore) -> None:
@@ -84,8 +84,8 @@ def folding(compression: Compression, time: float) -> Iterator[None]:
 
 def fold_message(when: str, compression: Compression) -> str:
     """Message of a Fold; when: "at t = 1 h" or "in the step from t = 1 h"."""
-    return (f"the aggregate's surface folds {when}: growth compressed it "
-            f"to an elastic stretch of {compression.stretch:.3f} near x = {compression.x:.4g}, "
+    return (f"{compression.aggregate}'s surface folds {when}: growth compressed it to an elastic "
+            f"stretch of {compression.stretch:.3f} near x = {compression.x:.4g}, "
             f"y = {compression.y:.4g} um at t = {compression.time:g} h; "
             f"it creases from {CREASE:g} on and is unstable to all waves below {BIOT:g}, so that "
             "the model has no smooth shape any more; a finer mesh does not help, "

@@ -100,14 +100,16 @@ class StepResult:
 class Compression:
     """The least elastic stretch of a run's free surface so far.
 
-    x, y: um, its place; time: h. A surface may buckle after it creases. Its stretch then rises
-    again until the buckles meet, so the present stretch does not show a fold.
+    x, y: um, its place; time: h; aggregate: its name in messages. A surface may buckle after it
+    creases. Its stretch then rises again until the buckles meet, so the present stretch does not
+    show a fold.
     """
 
     stretch: float = 1.0
     x: float = 0.0
     y: float = 0.0
     time: float = 0.0
+    aggregate: str = "the aggregate"
 
 
 @brief

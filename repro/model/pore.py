@@ -97,6 +97,11 @@ class Pore:
             origin[region.nodes] = body.reference
         return origin
 
+    def name_of(self, number: int) -> str:
+        """An aggregate in messages, by its place in the list."""
+        name = self.bodies[number].name
+        return "the aggregate" if len(self.bodies) == 1 and name == "1" else f"aggregate {name}"
+
     def with_masses(self, active: np.ndarray, inert: np.ndarray) -> Pore:
         """The pore with X_A and X_I (r, q) um2 mg/L at the points of the reaction."""
         bodies = [replace(body, active=self.of(region, active), inert=self.of(region, inert))

@@ -9,14 +9,14 @@ RUNNING = "running"
 INTERRUPTED = "interrupted"
 #: Prefix of a status that states the reason of a failure.
 FAILED = "failed: "
+AGGREGATE = r"(?:the aggregate|aggregate \S+)"
 TIME = r"t = \d+(?:\.\d+)?(?:e[+-]\d+)? h"
 #: The statuses of a run that the model itself ends: :class:`repro.errors.RunEnd`.
-RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
+RUN_ENDS = (re.compile(f"{AGGREGATE} reaches the pore's (?:up|down)stream end "
                        f"(?:at|in the step from) {TIME}"),
-            re.compile(f"the aggregate's surface folds (?:at|in the step from) {TIME}: growth .*"),
-            re.compile(r"(?:the aggregate|aggregate \S+) (?:detaches|tears) at "
-                       f"{TIME}: near x = .*"),
-            re.compile(rf"(?:the aggregate|aggregate \S+) is eroded at {TIME}: .*"),
+            re.compile(f"{AGGREGATE}'s surface folds (?:at|in the step from) {TIME}: growth .*"),
+            re.compile(f"{AGGREGATE} (?:detaches|tears) at {TIME}: near x = .*"),
+            re.compile(f"{AGGREGATE} is eroded at {TIME}: .*"),
             re.compile(f"erosion takes a contact surface at y = .* um in the step from {TIME}"),
             re.compile(f"the aggregates are steady at {TIME}: .*"),
             re.compile(rf"aggregates \S+ and \S+ meet (?:at|in the step from) {TIME}(?:: .*)?"))

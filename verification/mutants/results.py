@@ -800,8 +800,8 @@ MUTANTS = (
         ("half-a-fold",
          "A status that is cut off after the time of a fold counts as a fold.",
          "",
-         "f\"the aggregate's surface folds (?:at|in the step from) {TIME}: growth .*\"",
-         "f\"the aggregate's surface folds (?:at|in the step from) {TIME}.*\"",
+         "f\"{AGGREGATE}'s surface folds (?:at|in the step from) {TIME}: growth .*\"",
+         "f\"{AGGREGATE}'s surface folds (?:at|in the step from) {TIME}.*\"",
          "tests/test_sweep.py::test_every_status_takes_its_whole_path_through_a_sweep")),
     *changes(
         "repro/runs/history.py",
