@@ -149,7 +149,7 @@ def test_the_first_of_two_ends_in_a_step_counts(first):
 def test_a_stress_is_reported_in_the_unit_of_its_strength(key, strength, unit, in_MPa):
     scene = load_scene("base", [*BONDED, f"growth.{key}={strength} {unit}"])
     peak = Peak(1.5 * strength * in_MPa, 1.0, 2.0)
-    pore = SimpleNamespace(time=1.5, bodies=[SimpleNamespace(name="1")])
+    pore = SimpleNamespace(time=1.5, name_of=lambda number: "the aggregate")
     event = _detachment(Strength.of(scene, key), pore, 0, peak, "detaches", "its wall must bear")
     assert event.margin == pytest.approx(0.5)
     assert f" {1.5 * strength:.3g} {unit}, in the mean" in str(event.end)
