@@ -68,7 +68,7 @@ def test_a_transfer_keeps_the_masses_of_each_aggregate(order):
     at = transfer.located(both.mesh.points, both.mesh.cells[both.mesh.biomass], both.mesh.points[both.mesh.body])
     method = scene.numerics.scheme.transfer
     active, inert = transfer_amounts(method, both.space, both.space, at, (after.active, after.inert),
-                                     scene.kinetics.maximum_density)
+                                     scene.kinetics.maximum_density * both.space.reaction.dx)
     result = after.with_masses(active, inert)
     for before, body in zip(after.bodies, result.bodies):
         assert body.inert.sum() == pytest.approx(before.inert.sum(), rel=1e-9)

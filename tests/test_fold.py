@@ -155,7 +155,7 @@ def test_the_surface_folds_below_biots_limit_and_not_above(theta):
 @pytest.mark.parametrize("factor", [0.52, 1.94])
 def test_a_density_just_within_its_bounds_is_accepted(factor):
     pore = multiplied(factor, compressed(1.5), None).pore
-    assert refuse_density(pore, plug().kinetics.maximum_density) is None
+    assert refuse_density(pore, pore, plug().kinetics.maximum_density) is None
 
 
 @pytest.mark.parametrize("theta, kind", [(3.0, repro.Fold), (1.5, SimulationError)])

@@ -142,7 +142,7 @@ def _grow(course: Course, state: RestartState,
                 reached, control = _advance(course, state, pore, solved, event.margin)
                 step = reached.step
                 balance.refuse(course.limits, step.pore, step.ledger)
-                refuse_density(step.pore, stages.remeshing.maximum_density)
+                refuse_density(pore, step.pore, stages.remeshing.maximum_density)
         except RunEnd:
             if state.ledgers:  # steps that are not reported yet
                 report = make_report(state, pore, solved, None, shown)
@@ -152,7 +152,7 @@ def _grow(course: Course, state: RestartState,
             shown = step.within(state.row).pore.mesh.topology
         for time in course.rows:
             if state.time + SAME_TIME < time < step.pore.time - SAME_TIME:
-                inner, reason = _row_within(stages, step, time)
+                inner, reason = _row_within(stages, pore, step, time)
                 if inner:
                     report = make_report(state, inner.pore, inner.solved, inner.before, shown)
                     shown = inner.pore.mesh.topology
@@ -227,13 +227,13 @@ def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepR
     return replace(step, pore=contiguous(after), remeshed=remeshed), jumped
 
 
-def _row_within(stages: Stages, step: StepResult,
+def _row_within(stages: Stages, pore: Pore, step: StepResult,
                 time: float) -> tuple[InterpolatedState | None, str]:
-    """Return the state at a time (h) within a step, or the reason why it cannot be computed."""
+    """Return the state at a time (h) within a step, or why it cannot be computed; pore: before."""
     try:
         with np.errstate(all="raise", under="ignore"):
             inner = step.within(time)
-            refuse_density(inner.pore, stages.remeshing.maximum_density)
+            refuse_density(pore, inner.pore, stages.remeshing.maximum_density)
             return inner, ""
     except (RunEnd, StageError, FloatingPointError) as error:
         return None, str(error)

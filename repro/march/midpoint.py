@@ -100,7 +100,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
     new, remeshed = stages.new_mesh(previous, expanded, solved)
     generated = (GeneratedMesh(expanded, new),) if remeshed else ()
-    refuse_density(new, stages.remeshing.maximum_density)
+    refuse_density(previous, new, stages.remeshing.maximum_density)
     makes_contact = expanded.spanning > previous.spanning
     new = _with_line_speeds(new, previous, expansion, duration)
     flows = integrated(duration, half.solved.substrates.fluxes)

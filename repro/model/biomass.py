@@ -70,7 +70,7 @@ def change(first: Rates, second: Rates, weight: np.ndarray) -> float:
 
 
 def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: Amounts,
-                     density: float) -> Amounts:
+                     masses: np.ndarray) -> Amounts:
     """Transfer masses of biomass to a new mesh.
 
     Parameters
@@ -82,8 +82,8 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
         The nodes of the new mesh's aggregate in the old mesh.
     amounts : tuple of (r, q) arrays
         Active and inert masses, and other amounts of the same material, um2 mg/L.
-    density : float
-        X_m, mg/L.
+    masses : (r, q) float
+        Biomass at the new mesh's points if its density were X_m everywhere, um2 mg/L.
 
     Returns
     -------
@@ -92,24 +92,23 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 
     Notes
     -----
-    With shares the new mesh has the density X_m everywhere, which removes the error of J = theta
-    within a triangle. Each amount keeps its share of the biomass, and its sum in each aggregate.
+    With shares the new mesh has ``masses``, which removes the error of J = theta within a triangle.
+    Each amount keeps its share of the biomass, and its sum in each aggregate.
     """
-    return TRANSFERS[method](old, new, at, amounts, density)
+    return TRANSFERS[method](old, new, at, amounts, masses)
 
 
-def _inside(old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
+def _inside(old: Space, new: Space, at: Located, amounts: Amounts, masses: np.ndarray) -> Amounts:
     """Transfer the shares of the biomass to smaller aggregates within the old ones, whose density
     is X_m everywhere."""
-    masses = density * new.reaction.dx
     inert = _shares(old, new, at, amounts[:2])[0] * masses
     return masses - inert, inert
 
 
-def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
-    """Transfer the shares of the biomass; the new mesh has the density X_m everywhere."""
+def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts,
+               masses: np.ndarray) -> Amounts:
+    """Transfer the shares of the biomass; the new mesh has ``masses``."""
     inside = _shares(old, new, at, amounts)
-    masses = density * new.reaction.dx
     transferred = [np.zeros_like(masses) for _ in amounts]
     for before, after in zip(old.mesh.regions, new.mesh.regions):
         were = old.integration.rows(before)
@@ -134,7 +133,7 @@ def _shares(old: Space, new: Space, at: Located, amounts: Amounts) -> list[np.nd
 
 
 def _by_densities(carried: Callable[..., np.ndarray], old: Space, new: Space, at: Located,
-                  amounts: Amounts, density: float) -> Amounts:
+                  amounts: Amounts, masses: np.ndarray) -> Amounts:
     """Transfer amounts as densities at the nodes of straight triangles, by a function of
     :mod:`repro.fem.transfer`."""
     old_nodes = old.reaction.cells[:, 0]

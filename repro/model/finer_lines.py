@@ -29,10 +29,9 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
     origin = bisection.nodal(pore.origin)
     solids = [material(space, region, origin[region.nodes], body.solid.energy)
               for body, region in zip(pore.bodies, space.mesh.regions)]
-    # theta over J is smooth, and does not depend on the reference.
     expanded = bisection.of_each([body.theta * body.solid.at.dx for body in pore.bodies],
-                                 _present_dx(pore.mesh, [body.solid for body in pore.bodies]),
-                                 _present_dx(space.mesh, solids),
+                                 _areas(pore, pore.mesh, [body.solid for body in pore.bodies]),
+                                 _areas(pore, space.mesh, solids),
                                  pore.bodies[0].solid.shape.table)
     none = np.empty((0, 0))
     bodies = []
@@ -51,7 +50,10 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
     return fine, bisection
 
 
-def _present_dx(mesh: Mesh, solids: Sequence[Solid]) -> list[np.ndarray]:
-    """(t, q) um2 of each aggregate: the present areas of the points where growth is integrated."""
+def _areas(pore: Pore, mesh: Mesh, solids: Sequence[Solid]) -> list[np.ndarray]:
+    """(t, q) um2 of each aggregate: areas of the points where growth is integrated, per which
+    expansion is smooth. They are those at t = 0 if strain adds up, else the present ones."""
+    if pore.accumulates:
+        return [solid.at.dx for solid in solids]
     return [solid.at.dx * solid.strained(mesh.points[region.nodes]).J
             for solid, region in zip(solids, mesh.regions)]

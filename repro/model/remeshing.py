@@ -177,6 +177,8 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     -----
     theta restarts as J times the density over X_m. This expansion brings each density back to X_m,
     so that the next update removes the error of the constraint and it does not accumulate [E7].
+    Where strain adds up and shares are transferred, the new densities interpolate theta: J is rough
+    where strain is singular.
     """
     mesh, outlines = rules.meshing.around(expanded.outlines, expanded.front)
     new = Space(mesh)
@@ -246,7 +248,7 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
     old = expanded.mesh
     active, inert, *rest = biomass.transfer_amounts(
         rules.transfer, expanded.space, target.space, at,
-        (expanded.active, expanded.inert, *amounts), rules.maximum_density)
+        (expanded.active, expanded.inert, *amounts), _masses(rules, expanded, target, at))
     bodies = []
     for number, body in enumerate(target.bodies):
         def carry(positions: np.ndarray, before: Region = expanded.mesh.regions[number],
@@ -259,6 +261,27 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
     pore = replace(target, time=expanded.time, bodies=tuple(bodies),
                    pressure=_pressure(target.mesh, expanded, at)).with_masses(active, inert)
     return growing.with_restarted_theta(pore, rules.maximum_density), tuple(rest)
+
+
+def _masses(rules: Remeshing, expanded: Pore, target: Pore, at: Located) -> np.ndarray:
+    """(r, q) um2 mg/L, the biomass at the points of a new mesh if its density were X_m.
+
+    Where strain adds up and shares are transferred, it is X_m times the interpolated theta, per
+    area at t = 0. Its sum over an aggregate is X_m times the present area. Arguments as in
+    :func:`_transferred`.
+    """
+    new = target.space
+    areas = new.reaction.dx
+    if target.accumulates and rules.transfer == "shares":
+        old = expanded.mesh
+        theta = expanded.joined([body.theta for body in expanded.bodies])
+        nodal = at.field(expanded.space.integration.to_nodes(theta), old.cells[old.biomass])
+        theta = new.integration.to_points(target.mesh.from_body(nodal[:, None])[:, 0])
+        needed = [theta[new.integration.rows(region)] * body.solid.at.dx
+                  for body, region in zip(target.bodies, target.mesh.regions)]
+        areas = target.joined([each * (target.of(region, areas).sum() / each.sum())
+                               for each, region in zip(needed, target.mesh.regions)])
+    return rules.maximum_density * areas
 
 
 def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
