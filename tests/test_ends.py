@@ -181,7 +181,7 @@ def test_an_event_is_located_from_its_function(margin, zero):
 
 @pytest.mark.parametrize("error", [GrowthError("no rest"), FloatingPointError("overflow"), repro.PoreEnd("outside")])
 def test_an_end_is_not_a_failure_if_a_shorter_step_fails(error):
-    """The run ends with the shortest step that has passed the event."""
+    """The run ends with the shortest step that has passed the event, and says that the event may lie earlier."""
     def reach(time):
         if time < 2.2:
             raise error
@@ -189,6 +189,7 @@ def test_an_end_is_not_a_failure_if_a_shorter_step_fails(error):
 
     event = locate(reach, 0.0, -2.0, reached(lambda t: t - 2)(5.0))
     assert 2.2 <= event.time <= 5
+    assert str(event.event.end).endswith(f"it may happen earlier, after t = 0 h, since a shorter step fails: {error}")
 
 
 #: Scenes whose tables jump at 0.4 h.

@@ -413,6 +413,8 @@ ENDS = ["the aggregate reaches the pore's downstream end at t = 0 h",
         "the aggregate's surface folds in the step from t = 2 h: growth compressed it near x = 3 um",
         "the aggregate detaches at t = 1e-05 h: near x = 3, y = 0 um its wall must bear 2 MPa",
         "the aggregate tears at t = 12 h: near x = 3, y = 0 um its tensile stress is 2 MPa",
+        "the aggregate reaches the pore's upstream end at t = 1.5 h; it may happen earlier, after t = 1 h, since "
+        "a shorter step fails: no rest",
         "aggregates left and 2 meet at t = 3.5 h: near x = 3, y = 20 um the film between them is 2 um",
         "aggregate left is eroded at t = 3 h: its thickness or contact is 2 um, below growth.minimum_film",
         "erosion takes a contact surface at y = 20 um in the step from t = 3 h",

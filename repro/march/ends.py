@@ -31,7 +31,7 @@ no strain that accumulates, and so no limit of a fold.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import inf
 
@@ -164,6 +164,13 @@ class Reached:
     def time(self) -> float:
         """Time (h) of the end of the step."""
         return self.step.pore.time
+
+    def unlocated(self, after: float, error: Exception) -> Reached:
+        """The same if a shorter step fails; after: h, the last time before the event."""
+        end = self.event.end
+        text = (f"{end}; it may happen earlier, after t = {after:g} h, since a shorter step fails: "
+                f"{error}")
+        return replace(self, event=replace(self.event, end=type(end)(text)))
 
     def leaves(self, continues: bool) -> int | None:
         """Place in the list of the aggregate that leaves the pore there, None without one.
@@ -349,7 +356,8 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
     -------
     Reached
         The step to the event. Its margin is positive and at most CLOSE, or jumps there. If a
-        shorter step fails, it is the shortest one that has passed the event.
+        shorter step fails, it is the shortest one that has passed the event, and the message says
+        so.
     """
     low, high = margin - CLOSE / 2, passed.event.margin - CLOSE / 2
     side = 0
@@ -360,8 +368,8 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
         part = min(max(low / (low - high), LEAST_PART), 1 - LEAST_PART)
         try:
             trial = reach(start + part * interval)
-        except (RunEnd, StageError, FloatingPointError):
-            break
+        except (RunEnd, StageError, FloatingPointError) as error:
+            return passed.unlocated(start, error)
         value = trial.event.margin - CLOSE / 2
         if trial.event.margin > 0:
             passed, high = trial, value

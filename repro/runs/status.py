@@ -13,7 +13,7 @@ AGGREGATE = r"(?:the aggregate|aggregate \S+)"
 TIME = r"t = \d+(?:\.\d+)?(?:e[+-]\d+)? h"
 #: The statuses of a run that the model itself ends: :class:`repro.errors.RunEnd`.
 RUN_ENDS = (re.compile(f"{AGGREGATE} reaches the pore's (?:up|down)stream end "
-                       f"(?:at|in the step from) {TIME}"),
+                       f"(?:at|in the step from) {TIME}(?:; .*)?"),
             re.compile(f"{AGGREGATE}'s surface folds (?:at|in the step from) {TIME}: growth .*"),
             re.compile(f"{AGGREGATE} (?:detaches|tears) at {TIME}: near x = .*"),
             re.compile(f"{AGGREGATE} is eroded at {TIME}: .*"),
