@@ -131,8 +131,10 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
     shapes = _known_shapes(half, part)
     advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
                 for key in half.expansion.advances}
-    search = replace(search, advances=advances,
+    search = replace(search, advances=advances, interpolated=half.end is not None,
                      line_size=stages.remeshing.meshing.sizes.moving_lines)
+    if previous.spanning and half.end is None:
+        shapes = [(1.0, half.expansion)]
     return stages.expand(previous, after, _guess_shape(previous, shapes), search)
 
 

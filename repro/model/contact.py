@@ -33,6 +33,8 @@ CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
 #: Largest number of equilibria on small triangles. After each one, the triangles are small where it
 #: has placed the lines.
 PREDICTIONS = 3
+#: Defect of a shape that tells where its lines have small triangles.
+ROUGH = 1e-3
 #: Largest distance of a line from its expected place, over the size of the triangles there. At that
 #: distance they are five times as large.
 MISSED = 4
@@ -91,7 +93,16 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     equilibrium on the mesh.
     """
     start = guess or grown
-    if search.line_size < inf and len(_lines_after(grown, search.advances)):
+    if search.line_size == inf:
+        return _expand(mechanics, grown, theta, start, search)
+    if not search.interpolated:
+        rough = _expand(mechanics, grown, theta, start, replace(search, tolerance=ROUGH))
+        if not len(_lines_after(grown, rough.advances)):
+            return rough
+        search = replace(search, advances=rough.advances)
+        start = replace(grown.moved(rough.position),
+                        pressure=rough.pore.pressure[: grown.mesh.corners])
+    if len(_lines_after(grown, search.advances)):
         with suppress(GrowthError):
             return _on_small_triangles(mechanics, grown, theta, start, search)
     return _expand(mechanics, grown, theta, start, search)

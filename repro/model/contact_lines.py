@@ -28,7 +28,8 @@ import numpy as np
 
 from repro.errors import GrowthError
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, Walls, numbered
+from repro.fem.walls import FREE, Wall, Walls, numbered
+from repro.model.growth import NEWTON
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 #: With 2e-3 that was 0.01 um, up to 0.2 % of a short length of contact (``growth-gold-contact``).
@@ -42,6 +43,8 @@ ROUND_OFF = 1e-9
 PART_OF_ANGLE = 0.1
 #: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
+#: Arcs whose gap is larger than this, over the film, do not count: their clearance is over 1.
+NEAR_WALL = 2.0
 #: If an advance that is too short and one that is far enough are closer than this (arcs), the
 #: clearance is taken to jump between them.
 SAME_PLACE = 5e-3
@@ -84,6 +87,8 @@ class SearchOptions:
     patient: bool = True
     advances: Advances = field(default_factory=dict)
     line_size: float = inf
+    interpolated: bool = False
+    tolerance: float = NEWTON
 
     def refuse_late(self, gaps: tuple[float, float], film: float) -> None:
         """Raise FirstContact if the second of two gaps (um) is much less than the least film (um).
@@ -135,43 +140,50 @@ class Clearance:
         """
         arcs, last = _free_arcs(outline, node, direction)
         outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
-        place, points = self._places(arcs, outwards)
-        distance = outwards * (points[:, 0] - arcs[0, 0, 0])
         wall = numbered(self.walls, outline.wall[node])
-        gap = wall.film(points)
-        needs = np.minimum(self.film, np.tan(self.angle) * distance)
-        tested_from = ANGLE_FROM * (1 - ROUND_OFF) * self.film / np.tan(self.angle)
-        needs[distance < tested_from] *= PART_OF_ANGLE
-        facing = place > 0
+        nodes = self._scaled(arcs, arcs[0, 0], outwards, wall)
+        # The first arc is near, because it begins at the wall.
+        near = np.flatnonzero(nodes[1].min(axis=1) < NEAR_WALL)
+        place, distance, gap = _places(near, *(each[near] for each in nodes))
+        needs = np.minimum(distance, 1.0)
+        ratio = (gap - needs) / np.maximum(needs, ANGLE_FROM)
+        beside = np.maximum(gap, distance) < ANGLE_FROM * (1 - ROUND_OFF)
+        through = gap - PART_OF_ANGLE * np.maximum(distance, 0.0)
+        ratio[beside] = np.where(through < 0, through, AMPLE)[beside]
+        ratio[place == 0] = AMPLE
         if outline.wall[last] == wall.number:
             # Free surface between two lines of one wall belongs to the nearer line.
-            facing &= distance <= np.abs(points[:, 0] - outline.points[last, 0])
-        ratio = np.full(len(gap), AMPLE)
-        beside = facing & (needs > 0)
-        ratio[beside] = np.minimum(gap[beside] / needs[beside] - 1, AMPLE)
-        through = facing & (needs <= 0) & (gap < 0)
-        ratio[through] = gap[through] / self.film
+            apart, _ = self._scaled(outline.points[last], arcs[0, 0], outwards, wall)
+            ratio[distance > np.abs(distance - apart)] = AMPLE
         return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
 
-    def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) arcs from the line, and (K, 2) um the points there: PLACES of each arc, and the
-        points where the rule begins, and where it changes from the angle to the film."""
-        points = AT_PLACES @ arcs
-        place = np.arange(len(arcs))[:, None] + PLACES
-        places, all_points = [place.ravel()], [points.reshape(-1, 2)]
-        nodes = outwards * (arcs[..., 0] - arcs[0, 0, 0]) * np.tan(self.angle) / self.film
-        for change in (ANGLE_FROM, 1.0):
-            beyond = nodes @ AT_PLACES.T - change
-            arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
-            part = beyond[arc, k] / (beyond[arc, k] - beyond[arc, k + 1])
-            t = PLACES[k] + part * np.diff(PLACES)[k]
-            first, second = arc_derivatives(nodes[arc])
-            for _ in range(3):  # Newton's method; the interpolated place is near
-                error = np.einsum("ka,ka->k", parabola(t), nodes[arc]) - change
-                t = t - error / (first + second * t)
-            places.append(arc + t)
-            all_points.append(np.einsum("ka,kai->ki", parabola(t), arcs[arc]))
-        return np.concatenate(places), np.vstack(all_points)
+    def _scaled(self, points: np.ndarray, line: np.ndarray, outwards: float,
+                wall: Wall) -> tuple[np.ndarray, np.ndarray]:
+        """The distance of points (..., 2) um from a line over film / tan(angle), and their gap over
+        the film."""
+        distance = outwards * (points[..., 0] - line[0]) * np.tan(self.angle) / self.film
+        return distance, wall.film(points) / self.film
+
+
+def _places(numbers: np.ndarray, distances: np.ndarray,
+            gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(K,) arcs from the line, distance and gap of the points where the clearance is computed:
+    PLACES of each arc, those where the rule begins, and where it changes from the angle to the
+    film; numbers: (k,) of the arcs; distances, gaps: (k, 3) of their nodes."""
+    heights = np.concatenate([distances - ANGLE_FROM, distances - 1.0, gaps - ANGLE_FROM])
+    beyond = heights @ AT_PLACES.T
+    row, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
+    part = beyond[row, k] / (beyond[row, k] - beyond[row, k + 1])
+    t = PLACES[k] + part * np.diff(PLACES)[k]
+    first, second = arc_derivatives(heights[row])
+    for _ in range(3):  # Newton's method; the interpolated place is near
+        t = t - np.einsum("ka,ka->k", parabola(t), heights[row]) / (first + second * t)
+    arc = row % len(numbers)
+    arc, t = (np.concatenate(both) for both in (
+        (np.repeat(np.arange(len(numbers)), len(PLACES)), arc), (np.tile(PLACES, len(numbers)), t)))
+    weights = parabola(t)
+    return (numbers[arc] + t, np.einsum("ka,ka->k", weights, distances[arc]),
+            np.einsum("ka,ka->k", weights, gaps[arc]))
 
 
 def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray, int]:
