@@ -185,7 +185,7 @@ class ByLines(Closing):
                 partly = grown.with_body(theta=theta)
                 coupled = Coupled(partial(self._place, partly, wall, lines), lines, points,
                                   pressures)
-                coupled.solve(self.search.tolerance if part == 1 else PARTLY)
+                coupled.solve(growth.NEWTON if part == 1 else PARTLY)
                 self.iterations += coupled.iterations
                 points, pressures = coupled.placed.on_parent(coupled.position, coupled.pressure)
         except (GrowthError, LinearError, np.linalg.LinAlgError):

@@ -4,13 +4,15 @@ A contact line is the end of a contact surface. Its advance is the number of arc
 that have joined the wall beyond its previous position; a fraction divides an arc. The clearance
 beyond a line is the smallest value on the free surface of
 
-    gap / min(film, tan(angle) d) - 1
+    (gap - need) / max(need, ANGLE_FROM film),    need = min(film, tan(angle) d)
 
 at the distance d from the line along the wall. If it is negative, a film or a wedge is too thin.
-Beside the line the surface opens like the root of d, and the angle of the first arc depends on the
-arc's length. The angle is therefore tested at distances of ANGLE_FROM film / tan(angle) or more. A
-converged surface comes nearest to the wall there. Closer to the line PART_OF_ANGLE tan(angle)
-suffices, so that no arc passes the wall.
+Where a surface leans back over the contact, d and need are negative: beyond a line that is too far
+the clearance keeps its slope, and Newton's method can bring the line back. Beside the line the
+surface opens like the root of d, and the angle of the first arc depends on the arc's length. The
+rule is therefore tested where the gap is ANGLE_FROM film or more, or d is ANGLE_FROM film /
+tan(angle) or more. A converged surface comes nearest to the wall there. Closer to the line
+PART_OF_ANGLE tan(angle) suffices, so that no arc passes the wall.
 
 The contact surface is the smallest one without a negative clearance, so each line advances until
 its clearance vanishes. The secant method, safeguarded by bisection, searches for all lines at once.
@@ -29,21 +31,22 @@ import numpy as np
 from repro.errors import GrowthError
 from repro.fem.outline import Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Wall, Walls, numbered
-from repro.model.growth import NEWTON
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 #: With 2e-3 that was 0.01 um, up to 0.2 % of a short length of contact (``growth-gold-contact``).
 CLOSE = 5e-4
-#: Least distance from a line at which the angle is tested, over film / tan(angle). The converged
-#: surfaces of reference/gold come nearest to the wall at 0.31 to 1 of film / tan(angle).
+#: Least gap, over the film, and least distance from a line, over film / tan(angle), at which the
+#: rule is tested. The converged surfaces of reference/gold come nearest to the wall at 0.31 to 1 of
+#: film / tan(angle).
 ANGLE_FROM = 0.2
 #: Relative round-off of a distance.
 ROUND_OFF = 1e-9
 #: Tangent of the least angle closer to the line, over tan(angle). A converged surface is steeper.
 PART_OF_ANGLE = 0.1
-#: Upper bound of the clearance, and its value if no free surface faces the wall.
+#: The clearance of points that are not tested.
 AMPLE = 10.0
-#: Arcs whose gap is larger than this, over the film, do not count: their clearance is over 1.
+#: Arcs that are farther from the wall than this times the film do not count: their clearance is 1
+#: or more.
 NEAR_WALL = 2.0
 #: If an advance that is too short and one that is far enough are closer than this (arcs), the
 #: clearance is taken to jump between them.
@@ -87,8 +90,6 @@ class SearchOptions:
     patient: bool = True
     advances: Advances = field(default_factory=dict)
     line_size: float = inf
-    interpolated: bool = False
-    tolerance: float = NEWTON
 
     def refuse_late(self, gaps: tuple[float, float], film: float) -> None:
         """Raise FirstContact if the second of two gaps (um) is much less than the least film (um).
@@ -134,7 +135,7 @@ class Clearance:
         Returns
         -------
         clearance : float
-            At most AMPLE; AMPLE if no free surface faces the wall.
+            Beyond a line that is too far, it grows with the distance from the line to the surface.
         reach : float
             Arcs from the line to the farthest point with a negative clearance, zero if none.
         """
@@ -142,15 +143,13 @@ class Clearance:
         outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
         wall = numbered(self.walls, outline.wall[node])
         nodes = self._scaled(arcs, arcs[0, 0], outwards, wall)
-        # The first arc is near, because it begins at the wall.
         near = np.flatnonzero(nodes[1].min(axis=1) < NEAR_WALL)
         place, distance, gap = _places(near, *(each[near] for each in nodes))
         needs = np.minimum(distance, 1.0)
-        ratio = (gap - needs) / np.maximum(needs, ANGLE_FROM)
         beside = np.maximum(gap, distance) < ANGLE_FROM * (1 - ROUND_OFF)
-        through = gap - PART_OF_ANGLE * np.maximum(distance, 0.0)
-        ratio[beside] = np.where(through < 0, through, AMPLE)[beside]
-        ratio[place == 0] = AMPLE
+        needs[beside] = PART_OF_ANGLE * np.maximum(needs[beside], 0.0)
+        ratio = (gap - needs) / np.maximum(needs, ANGLE_FROM)
+        ratio[(place == 0) | beside & (ratio >= 0)] = AMPLE
         if outline.wall[last] == wall.number:
             # Free surface between two lines of one wall belongs to the nearer line.
             apart, _ = self._scaled(outline.points[last], arcs[0, 0], outwards, wall)
