@@ -34,8 +34,8 @@ CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
 #: has placed the lines.
 PREDICTIONS = 3
 #: Largest distance of a line from its expected place, over the size of the triangles there. At that
-#: distance they are five times as large.
-MISSED = 4
+#: distance they are three times as large.
+MISSED = 2
 #: Growth of this size with the distance from a line. Bisection keeps the angles whatever it is.
 LINE_GRADATION = 1.0
 #: Contact lines stay in place after so many rounds of shape and fluid forces, because each search
