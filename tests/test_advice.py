@@ -42,7 +42,7 @@ FOLLOWED = {
     "cli/check.py": {"continues the run": SIGNALS},
     "cli/run.py": {"or --resume DIR": SIGNALS, "--resume continues the run": SIGNALS, "makes a run longer": LONGER,
                    "try a smaller numerics.refinement": MEMORY},
-    "cli/sweep.py": {"continues the sweep": "tests/test_sweep.py::test_a_signal_ends_a_sweep_quietly"},
+    "cli/sweep.py": {"continues the sweep": SIGNALS},
     "fem/linear.py": {"pip install": PACKAGES},
     "scene/drawn.py": {"pip install": PACKAGES},
     "scene/former.py": {"leave it out": "tests/test_former.py::test_the_advice_is_accepted"},
