@@ -205,8 +205,8 @@ def test_every_signal_stops_every_command_and_saves(tmp_path, command, number):
     the time of the last step, and not that of the run's end."""
     out = tmp_path / "out"
     run = out if command != "sweep" else out / "runs"
-    arguments = {"sweep": ["sweep", "base", "--vary", "pore.width=50 um", "--workers", "1", "--quiet", "--out", str(out)],
-                 }.get(command, ["run", "base", "--out", out])
+    sweep = ["sweep", "base", "--vary", "pore.width=50 um", "--workers", "1", "--quiet", "--out", str(out)]
+    arguments = sweep if command == "sweep" else ["run", "base", "--out", out]
     for _ in range(2 if command == "resume" else 1):
         before = time.time()
         process = start(*arguments, start_new_session=True)

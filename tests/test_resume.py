@@ -99,22 +99,6 @@ def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, n
     check_parts(load_scene("base", {**SCENES, **THOROUGH_SCENES}[name]), tmp_path)
 
 
-@pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*BRIEF), "--force", "--out"]],
-                         ids=["go on", "anew"])
-@pytest.mark.parametrize("content, why", [
-    (None, "there is no run.json|it contains 'thesis.tex', which is not of a run; give a new folder"),
-    ("[" * 100_000, "run.json cannot be read"), ("null", "run.json cannot be read: it is not a JSON object"),
-    ('{"files": "thesis.tex"}', "run.json cannot be read: its checksum is wrong|run.json lists no files of a run")])
-def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, arguments):
-    """The status is 2, one line describes the folder and the remedy, and nothing changes."""
-    (tmp_path / "thesis.tex").write_text("years of work")
-    if content is not None:
-        (tmp_path / "run.json").write_text(content)
-    message = refusal(tmp_path, capsys, *arguments, tmp_path)
-    assert re.search(why, message)
-    assert content is None or "--resume" in arguments or "another" in message
-
-
 def test_every_bit_of_a_finished_run_is_checked(tmp_path, capsys):
     """After a flipped bit in any file, or an exchanged or missing file, `check` and --resume name the file, with status
     2. A missing page is made again."""
