@@ -2681,7 +2681,7 @@ MUTANTS = (
          "time_before_end",
          "return max(previous.time, previous.time + duration - SAME_TIME)",
          "return max(previous.time, previous.time + duration)",
-         "tests/test_ends.py::test_a_jump_is_judged_on_both_sides")),
+         "tests/test_stepping.py::test_the_solution_after_a_step_to_a_jump_is_that_before_it[midpoint]")),
     *changes(
         "verification/claims/report.py",
         ("first-value-undated",
@@ -2810,7 +2810,7 @@ MUTANTS = (
          "The first contact is always with the upper wall.",
          "ByLines._touch",
          "nearest, *_ = outline.untouched(self._rule.walls)",
-         "*_, nearest = self._rule.walls",
+         "nearest = max(self._rule.walls, key=lambda wall: wall.y)",
          f"{MIRRORS}contact_advances_alike_in_a_pore_and_its_mirror_image[2-False-across]")),
     *changes(
         "repro/model/mechanics.py",
