@@ -15,9 +15,8 @@ in FiPy's finite volumes, as in :mod:`reference.channel_fipy` (FiPy's outlet pas
 constrained there). The uptake is added cell by cell, and Newton's method solves the equations.
 
 *Growth.* a and i are X_A and X_I in the material of a cell, over X_m and per volume at t = 0: a' = a r_A(C),
-i' = a r_I(C), (9)-(10); its area grows by theta = a + i. A thin strip that slides on its wall bears no stress,
-sigma_xx = sigma_yy = 0, so that both stretches of each cell are sqrt(theta); x = 0 stays in place. An aggregate that
-keeps its shape, as a half-disc nearly does, stretches by the root of the mean theta; its biomass is uniform.
+i' = a r_I(C), (9)-(10), in the mean over the aggregate; its area grows by theta = a + i. An aggregate that keeps its
+shape, as a half-disc nearly does, stretches by sqrt(theta); its biomass is uniform, and x = 0 stays in place.
 
 Units are consistent. Pairs are (acceptor, donor).
 """
@@ -137,16 +136,14 @@ def _unit_flux(cells):
 
 
 class Averaged:
-    """The run of a seed with cells of ``lengths`` and ``heights`` (n,). fluid: number of cells on each side of it;
-    keeps_shape: whether the seed keeps its shape. Otherwise it deforms as a strip."""
+    """The run of a seed with cells of ``lengths`` and ``heights`` (n,). fluid: number of cells on each side of it."""
 
-    def __init__(self, pore, lengths, heights, fluid, keeps_shape):
+    def __init__(self, pore, lengths, heights, fluid):
         self.pore = pore
         self.lengths = lengths
         self.heights = heights
         self.fluid = fluid
         self.areas = lengths * heights
-        self.keeps_shape = keeps_shape
         self.fields = None
         self.supply = lambda _: pore.supply
 
@@ -181,9 +178,9 @@ class Averaged:
     def _start(self):
         return np.concatenate([np.ones_like(self.areas), np.zeros_like(self.areas)])
 
-    def _local_or_mean(self, values):
-        """The values of the cells or, if the aggregate keeps its shape, their mean over it."""
-        return np.full_like(values, self.areas @ values / self.areas.sum()) if self.keeps_shape else values
+    def _mean(self, values):
+        """The mean of the values of the cells over the aggregate, in each cell."""
+        return np.full_like(values, self.areas @ values / self.areas.sum())
 
     def _solve_section(self, time, state):
         """The section and theta; the concentrations are stored in ``fields``."""
@@ -200,7 +197,7 @@ class Averaged:
         rates, active = self.pore.rates, state[: len(self.areas)]
         m_a, m_d = (c[section.inside] / (c[section.inside] + rates[key]) for c, key in zip(self.fields, ("K_A", "K_D")))
         growth, remains = m_a * (rates["k"] * rates["Y"] * m_d - rates["b"]), m_a * rates["remains"]
-        return np.concatenate([self._local_or_mean(active * growth), self._local_or_mean(active * remains)])
+        return np.concatenate([self._mean(active * growth), self._mean(active * remains)])
 
     def _state_at(self, time, state):
         section, theta = self._solve_section(time, state)

@@ -23,7 +23,8 @@ from tests.shell import refusal, run_python
 
 #: Tests that follow several sentences.
 FOLDERS = "tests/test_advice.py::test_a_run_starts_if_the_advice_about_its_folder_is_followed"
-ENTRIES = "tests/test_advice.py::test_an_entry_is_accepted_if_the_advice_is_followed"
+PAIRS = "tests/test_scene_refusals.py::test_the_key_that_was_set_is_named"
+ENTRIES = "tests/test_scene_refusals.py::test_a_wrong_entry_is_refused"
 PACKAGES = "tests/test_advice.py::test_packages_to_install_are_those_that_the_project_names"
 MEMORY = "tests/test_advice.py::test_a_smaller_refinement_helps_against_a_lack_of_memory"
 DRAWN = "tests/test_advice.py::test_the_advice_of_check_is_accepted_and_helps"
@@ -42,7 +43,7 @@ FOLLOWED = {
     "cli/check.py": {"continues the run": SIGNALS},
     "cli/run.py": {"or --resume DIR": SIGNALS, "--resume continues the run": SIGNALS, "makes a run longer": LONGER,
                    "try a smaller numerics.refinement": MEMORY},
-    "cli/sweep.py": {"continues the sweep": "tests/test_sweep.py::test_a_signal_ends_a_sweep_quietly"},
+    "cli/sweep.py": {"continues the sweep": SIGNALS},
     "fem/linear.py": {"pip install": PACKAGES},
     "scene/drawn.py": {"pip install": PACKAGES},
     "scene/former.py": {"leave it out": "tests/test_former.py::test_the_advice_is_accepted"},
@@ -93,7 +94,7 @@ FOLLOWED = {
         "repeat the command": "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line"},
     "runs/machine.py": {"or leave the key out": PACKAGES},
     "runs/recorder.py": {"continues the run": SIGNALS},
-    "scene/rules.py": {"removes it": ENTRIES},
+    "scene/rules.py": {"removes it": PAIRS},
     "scene/text.py": {"remove it to set the key":
                       "tests/test_scene_text.py::test_every_key_may_be_made_active_at_once"},
     "scene/units.py": {"give milligrams": ENTRIES, "give mg/L": ENTRIES},
@@ -140,19 +141,6 @@ def test_every_sentence_of_advice_was_followed():
     for place in {place for rows in FOLLOWED.values() for place in rows.values() if "::" in place}:
         module, _, name = place.partition("::")
         assert f"def {name}(" in (ROOT / module).read_text(encoding="utf-8"), place
-
-
-@pytest.mark.parametrize("refused, accepted, advice", [
-    (["pore.width=50 um", "flow.mean_velocity=1 m/day"], ["--unset flow.head"], "(unset flow.head removes it)"),
-    (["substrates.acceptor.supply=0.3 mmol/L"], ["substrates.acceptor.supply=9.6 mg/L"], "give milligrams"),
-    (["substrates.acceptor.supply=9.6 ppm"], ["substrates.acceptor.supply=9.6 mg/L"], "give mg/L"),
-])
-def test_an_entry_is_accepted_if_the_advice_is_followed(refused, accepted, advice):
-    with pytest.raises(SceneError) as refusal_of_entry:
-        load_scene("base", refused)
-    assert advice in str(refusal_of_entry.value)
-    unset = [entry.removeprefix("--unset ") for entry in accepted if entry.startswith("--unset ")]
-    load_scene("base", refused if unset else accepted, unset=unset)
 
 
 def test_packages_to_install_are_those_that_the_project_names():

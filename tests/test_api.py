@@ -119,12 +119,6 @@ def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
         load_scene({"pore": {"width": 3}})
 
 
-def test_check_prints_the_same_as_repro_check(capsys):
-    assert main(["check", "wide", "--no-run"]) == 0
-    report = capsys.readouterr().out.partition("Cost")[0]  # the cost depends on a trial run
-    assert "Mesh at t = 0" in report and str(repro.check("wide", run=False)).startswith(report)
-
-
 def test_a_loaded_run_equals_the_solved_one(solved, tmp_path):
     """Rows, the table and fields agree to the last bit, also in a folder without fields."""
     repro.run(load_scene("base", SHORT), str(tmp_path))

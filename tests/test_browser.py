@@ -6,9 +6,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from repro import report
 from tests import browser
-from tests.pages import FAST, make_hostile, page_data, run
+from tests.pages import FAST, page_data, run
 
 pytestmark = [pytest.mark.thorough,
               pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed")]
@@ -87,15 +86,3 @@ def test_the_button_saves_the_picture_of_the_page(window, runs, tmp_path):
     parts = window.run("[...document.querySelectorAll('#picture *')].map(part => part.getAttribute('d'))")
     assert background.get("fill") == "#ffffff" and [part.get("d") for part in saved] == parts
     assert "var(" not in file.read_text(encoding="utf-8") and len({part.get("fill") for part in saved}) > 50
-
-
-def test_hostile_names_run_nothing(window, tmp_path):
-    """Neither a scene and its status nor an added script runs."""
-    out = make_hostile(run(tmp_path, "base", FAST, 'growth.end="1 h"'))
-    report.write(out)
-    report.compare([out, out], tmp_path / "both.html")
-    for page in (out, tmp_path / "both.html"):
-        show(window, page)
-        assert window.run("typeof pwned") == "undefined" and window.run("document.images.length") == 0
-    window.run("document.body.append(Object.assign(document.createElement('script'), {textContent: 'pwned = 1'}))")
-    assert window.run("typeof pwned") == "undefined"

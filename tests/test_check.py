@@ -28,7 +28,6 @@ from repro.scene.units import units_of
 from repro.schemes import CURVED
 from tests.shell import refusal
 from tests.strategies import coarse_base
-from verification.problems import family
 
 pytestmark = pytest.mark.usefixtures("without_progress")
 
@@ -283,19 +282,6 @@ def test_the_outlook_says_how_a_run_ends():
     assert check(near, run=False).outlook is None
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("number, stopped", [
-    (4, "the pore's upstream end"), (18, "the pore's upstream end"), (20, ""), (22, "surface folds")])
-def test_the_outlook_of_a_pore_has_its_recorded_end(number, stopped):
-    """A pore of the family ends as in fast, and within 5 % of the time."""
-    member = family.draw_member(number)
-    outlook = CoarseRun(member.scene(*member.duration)).run(lambda _: None, 300.0)
-    row = family.read_record()[number]
-    assert outlook.time == pytest.approx(row["times_h"][-1], rel=0.05) and stopped in outlook.stopped
-    assert row["status"] == "completed" if stopped == "" else stopped in row["status"]
-    assert (outlook.contact is not None) == row["contact"]
-
-
 def test_a_coarse_run_that_fails_is_no_refusal(monkeypatch, capsys):
     def fail(scene):
         yield from itertools.islice(simulation.steps(scene), 2)
@@ -418,11 +404,6 @@ def test_a_scene_that_cannot_run_is_refused(tmp_path, override, excerpt, capsys)
     assert excerpt in refusal(tmp_path, capsys, "check", "base", "--set", override)
 
 
-def test_the_expected_time_grows_with_the_mesh():
-    estimate = cost.estimate_cost(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000), 4000, None)
-    assert estimate.seconds == pytest.approx(2 * 4**1.2, rel=1e-12)
-
-
 def test_the_pressure_of_a_plug_drops_over_its_whole_length():
     scene = load_scene("wide", ['flow.mean_velocity="2.9 m/day"'])
     drop = 12 * 2000 * 998 * 1.003e-6 * 2.9 / 86400 / 100e-6**2 * 2 * 150e-6 / 1e4
@@ -436,11 +417,6 @@ def test_requested_rows_are_counted_with_that_at_zero(times):
     description = dict(modelled.describe_model(scene))
     assert "rows and fields at 3 times" in description["output"]
     assert "an aggregate with a permeability of 2.5e-15 m2" in description["flow"]
-
-
-def test_a_seed_at_both_walls_is_in_contact_from_the_start():
-    scene = load_scene("base", ["aggregate.radius=49.9 um"])
-    assert numbers.at_start(scene).contact and not numbers.at_start(load_scene("base")).contact
 
 
 @pytest.mark.parametrize("half, kind", [("0.02 mg/L", "zero-order front"), ("20 mg/L", "layer of first-order uptake")])

@@ -127,13 +127,6 @@ def run(monkeypatch, *changes, unset=()):
     return attempts, last.pore.time
 
 
-def test_a_run_shortens_a_step_in_which_biomass_overflows(monkeypatch):
-    """The first step is 16 000 h. Its exponentials and those of 8000 h overflow."""
-    attempts, end = run(monkeypatch, "growth.time_step=2000 h")
-    assert end == 0.6 and [length for length, _ in attempts[:3]] == [16000.0, 8000.0, 2000.0]
-    assert [type(error) for _, error in attempts[:3]] == [GrowthError, GrowthError, type(None)]
-
-
 def leave_domain(monkeypatch, owner, name, shortest=0.0):
     """Let a function of a stage leave its domain in each attempted step longer than ``shortest`` (h)."""
     function, attempt, lengths = getattr(owner, name), midpoint.attempt, [0.0]

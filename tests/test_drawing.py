@@ -81,7 +81,6 @@ def test_a_film_has_every_row_in_one_view_and_one_palette(results, tmp_path):
 @pytest.mark.parametrize("call, error, message", [
     (lambda run, file: run.animate("donor", file.with_suffix(".avi")), ValueError, "that ends in .gif or .mp4"),
     (lambda run, file: run.animate("doner", file), KeyError, "no such column or field; did you mean donor"),
-    (lambda run, file: run.plot("acceptor", time=[1]), TypeError, "plot: time: one time of a field is needed"),
     (lambda run, file: repro.solve({"pore": {"width": "50 um"}}).plot(), KeyError, "no curves of flow"),
 ])
 def test_a_wrong_request_is_refused_and_nothing_is_written(results, tmp_path, call, error, message):
@@ -109,13 +108,6 @@ def test_the_command_draws_the_same(results, tmp_path, capsys):
         draw.figure.savefig(expected, dpi=150)
         expected.seek(0)
         assert np.array_equal(plt.imread(out), plt.imread(expected)) and str(out) in capsys.readouterr().out
-
-
-@pytest.mark.thorough
-def test_the_command_draws_a_film(results, tmp_path):
-    assert main(["plot", str(results.folder), "donor", "--out", str(tmp_path / "film.gif")]) == 0
-    with Image.open(tmp_path / "film.gif") as film:
-        assert film.n_frames == len(results.time)
 
 
 @pytest.mark.parametrize("arguments, message", [

@@ -75,12 +75,6 @@ def test_a_run_reaches_beyond_its_rows():
         assert same(inner.fields(time), solved("fast", more=True).fields(time))
 
 
-@pytest.mark.parametrize("time", [-0.1, 0.7, "1 h"])
-def test_a_time_outside_the_run_is_refused_with_its_times(time):
-    with pytest.raises(KeyError, match=r" h: outside the run, from 0 to 0.6 h"):
-        solved("fast").fields(time)
-
-
 def test_a_profile_is_the_field_along_a_line():
     """A linear function of the places is met to round-off, in curved triangles too; ends lie on the walls."""
     results = solved("fast")

@@ -1,7 +1,7 @@
 """Stokes flow (1)-(6): equal flux through every section of any mesh, and permeable biomass.
 
-The cases of the stage flow cover closed forms, other codes, energy, obstacles and mirrors. The cases coupling-units and
-hard-17-units cover units of length. `test_derived.py` covers the reported quantities of the pore.
+The cases of the stage flow cover closed forms, other codes, energy, obstacles and mirrors. The case hard-17-units
+covers units of length. `test_derived.py` covers the reported quantities of the pore.
 """
 import numpy as np
 import pytest

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import repro
-from repro.cli import main
 from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
 from repro.march.balance import Ledger
@@ -28,10 +27,7 @@ from repro.model.meshing import seeded
 from repro.model.solving import solve
 from repro.model.surface import surface
 from repro.preflight.simplifications import warn_surface
-from repro.results import read_table
 from repro.scene import load_scene
-from tests.shell import read_record, state
-from verification.problems import family
 
 SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"', 'growth.end="6 h"',
         'aggregate.outline=[["-10 um", "0 um"], ["-10 um", "20 um"], ["10 um", "20 um"], ["10 um", "0 um"]]',
@@ -42,35 +38,6 @@ SETS = ('numerics.preset="fast"', "numerics.refinement=0.3", 'pore.width="20 um"
 @cache
 def plug(*changes):
     return load_scene("base", [*SETS, *changes], unset=["aggregate.radius"])
-
-
-def warned(folder):
-    """Return the warnings of creases in run.json."""
-    return [entry["text"] for entry in read_record(folder)["warnings"] if entry["key"] == "growth.new_biomass"]
-
-
-@pytest.mark.thorough
-def test_a_fold_ends_a_run(tmp_path, capsys):
-    """The exit status is 0, and the independent stretches confirm the fold; test_ends.py tests its time. The warning
-    appears once, when creases begin. The same command and --resume leave the run unchanged."""
-    words = [part for change in SETS for part in ("--set", change)]
-    command = ["run", "base", "--unset", "aggregate.radius", *words, "--out", str(tmp_path / "run")]
-    assert main(command) == 0
-    folder = tmp_path / "run"
-    messages = [line for line in capsys.readouterr().err.splitlines() if "growth.new_biomass: " in line]
-    table = read_table(folder / "timeseries.csv")
-    status = read_record(folder)["status"]
-    assert "a finer mesh does not help" in status and 'growth.new_biomass = "stress_free" does' in status
-    assert family.judge(folder, status)["verdict"] == family.FOLD
-    texts = warned(folder)
-    assert len(texts) == 1
-    text = texts[0]
-    assert [line.partition("growth.new_biomass: ")[2] for line in messages] == [text]
-    begun = float(text.split()[3])
-    assert table["surface_stretch_min"][1] > CREASE > table["surface_stretch_min"][2]
-    assert 1 < begun < 1.001 * table["time_h"][-1], "the end of the first step below CREASE, to the printed digits"
-    before = state(folder)
-    assert main(command) == 0 and main(["run", "--resume", str(folder)]) == 0 and state(folder) == before
 
 
 @cache

@@ -68,20 +68,6 @@ def out(short, tmp_path):
     return tmp_path / "run"
 
 
-def test_foreign_files_are_not_removed(out, short, capsys):
-    """A resume without a good checkpoint starts again and keeps foreign files, even with names of fields and tables."""
-    spoil(out)
-    (out / "fields" / "notes").mkdir()
-    mine = dict.fromkeys(["thesis.tex", "timeseries.nc", "fields/mine.vtu", "fields/fields_0099.vtu",
-                          "fields/notes/a.txt", "before_expansion.pvd"], b"years of work")
-    for name, content in mine.items():
-        (out / name).write_bytes(content)
-    assert resume_run(out) == 0
-    assert "starts again from t = 0" in capsys.readouterr().err
-    assert files(out) == files(cached_run(short)) | mine
-    assert not mine.keys() & {*read_record(out)["files"]}
-
-
 def test_foreign_files_are_not_replaced(out, capsys):
     """A foreign file with the name of the next fields is refused in one line and stays unchanged."""
     count = len(list((out / "fields").iterdir()))

@@ -109,20 +109,6 @@ def test_a_time_shorter_than_the_shortest_step_is_one_step():
     assert len(gear.advance(problem, pore.active, pore.inert, steady, 0.1 * gear.SHORTEST).steps) == 1
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_steps_from_the_first_on_agree_with_small_steps(order):
-    """Uptake and biomass made in 12 min of a settled pore. The errors are those that gear.py states: 2e-4 of a first
-    step of FIRST, which is of first order, and 3.1e-4 of the controlled ones."""
-    pore, problem = case(order=order)
-    start = gear.settle(problem, Sink(pore.active), None)
-    computed, small = (gear.advance(problem, pore.active, pore.inert, start, 0.2, fixed_step=step)
-                       for step in (None, gear.FIRST / 4))
-    assert len(computed.steps) < len(small.steps) / 4
-    assert computed.flows.consumed == pytest.approx(small.flows.consumed, rel=5.1e-4)
-    growth, expected = (end.active.sum() / pore.active.sum() - 1 for end in (computed, small))
-    assert growth == pytest.approx(expected, rel=5.1e-4)
-
-
 @EVERY_ORDER
 def test_only_the_aggregate_controls_the_step(order):
     """3.3.2: a change 75 um upstream within 0.01 s, of which exp(-75 / 5) reaches the aggregate, needs no shorter step.

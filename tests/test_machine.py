@@ -17,11 +17,10 @@ from repro.model.meshing import seeded
 from repro.preflight import memory
 from repro.preflight.checked import check
 from repro.runs import execution, machine
-from repro.runs.execution import resume
-from repro.scene import SceneError, load_scene
+from repro.scene import load_scene
 from tests import faults
 from tests.pages import run
-from tests.shell import SHORT, files, interrupt_run, read_record, refusal, run_and_wait, run_python
+from tests.shell import SHORT, files, read_record, refusal, run_and_wait, run_python
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 
@@ -33,17 +32,6 @@ def test_an_absent_package_is_reported_before_anything_is_written(tmp_path, caps
     message = 'base: numerics.solver = "pardiso": the package pypardiso is not installed; pip install pypardiso'
     out = tmp_path / "out"
     assert message in refusal(tmp_path, capsys, *command, "--set", "numerics.solver=pardiso", "--out", out)
-
-
-def test_a_package_uninstalled_since_is_reported_at_a_resume(tmp_path, monkeypatch):
-    scene = load_scene("base", ("numerics.preset=fast", "numerics.solver=pardiso"))
-    with monkeypatch.context() as patch:
-        patch.setattr(machine, "find_spec", lambda name: name)
-        faults.replace_package(patch, "pypardiso")
-        interrupt_run(scene, tmp_path, after=1)
-    faults.remove_package(monkeypatch, "pypardiso")
-    with pytest.raises(SceneError, match="pypardiso is not installed"):
-        resume(tmp_path)
 
 
 @pytest.mark.parametrize("name, sets", [

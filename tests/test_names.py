@@ -4,6 +4,7 @@ import errno
 import io
 import os
 import re
+import shlex
 import shutil
 import signal
 import socket
@@ -204,8 +205,8 @@ def test_every_signal_stops_every_command_and_saves(tmp_path, command, number):
     the time of the last step, and not that of the run's end."""
     out = tmp_path / "out"
     run = out if command != "sweep" else out / "runs"
-    arguments = {"sweep": ["sweep", "base", "--vary", "pore.width=50 um", "--workers", "1", "--quiet", "--out", out],
-                 }.get(command, ["run", "base", "--out", out])
+    sweep = ["sweep", "base", "--vary", "pore.width=50 um", "--workers", "1", "--quiet", "--out", str(out)]
+    arguments = sweep if command == "sweep" else ["run", "base", "--out", out]
     for _ in range(2 if command == "resume" else 1):
         before = time.time()
         process = start(*arguments, start_new_session=True)
@@ -214,8 +215,10 @@ def test_every_signal_stops_every_command_and_saves(tmp_path, command, number):
         message = process.communicate(timeout=60)[1]
         assert process.returncode == 128 + number, message
         assert message.endswith(f"continues the {'sweep' if command == 'sweep' else 'run'}\n")
-        assert "Traceback" not in message
-        if command != "sweep":
+        assert "Traceback" not in message and (command != "sweep" or " ".join(map(shlex.quote, arguments)) in message)
+        if command == "sweep":
+            assert (out / "table.csv").exists() and (out / "summary.html").exists() and message.count("\n") == 1
+        else:
             (stopped,) = re.findall(r" at t = (\S+) h; the results", message)
             assert float(rows(out / "timeseries.csv")[-1]["time_h"]) <= float(stopped) < 19.4
         records = [read_sealed(path) for path in run.rglob("run.json")]

@@ -51,12 +51,6 @@ def test_the_dataset_names_scene_source_and_units(folder, tmp_path):
     assert dataset.time_h.attrs["units"] == "h" and "time_h" in dataset.coords
 
 
-def test_a_file_that_cannot_be_written_is_refused(folder, tmp_path):
-    with pytest.raises(repro.OutputError, match=f"{tmp_path}: Is a directory; a file that can be written is needed"):
-        repro.load_run(folder).to_netcdf(tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
 def test_columns_have_a_fill_value_and_time_has_none(folder, tmp_path):
     """CF forbids missing values of coordinates."""
     repro.load_run(folder).to_netcdf(tmp_path / "mine.nc")

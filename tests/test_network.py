@@ -199,8 +199,7 @@ def test_the_uptake_at_a_zero_is_the_limit(zeros, area):
 
 @pytest.mark.parametrize("values, message", [
     ((100.0, 30.0, 1.0, 8.0, 5.0), "width = 30 is not known; 40 to 150 is accepted"),
-    ((1e5, 60.0, 1.0, 8.0, 5.0), "area / width^2 = 27.7778 "), ((100.0, 60.0, 11.0, 8.0, 5.0), "velocity = 11 "),
-    ((100.0, 60.0, -1.0, 8.0, 5.0), "velocity = -1 "), ((100.0, 60.0, 1.0, 21.0, 5.0), "acceptor = 21 "),
+    ((1e5, 60.0, 1.0, 8.0, 5.0), "area / width^2 = 27.7778 "), ((100.0, 60.0, -1.0, 8.0, 5.0), "velocity = -1 "),
     ((100.0, 60.0, 1.0, 8.0, float("nan")), "donor = nan is not known; 0 to 20 is accepted")])
 def test_uptakes_outside_of_the_range_are_refused(values, message):
     columns = [[good, bad] for good, bad in zip((100.0, 60.0, 1.0, 8.0, 5.0), values)]

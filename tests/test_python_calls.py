@@ -3,7 +3,6 @@
 import inspect
 import io
 from contextlib import redirect_stderr
-from functools import partial
 
 import numpy as np
 import pint
@@ -68,17 +67,6 @@ def test_a_wrong_type_is_refused_by_the_name_of_its_argument(function, arguments
         function(*arguments, **keywords)
     assert str(caught.value).isprintable() and " at 0x" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_numbers_and_arrays_of_numpy_are_accepted():
-    """An array is accepted where a list is, and a truth value of NumPy where one of Python is."""
-    changes, unset = np.array(["flow.mean_velocity=1 m/day"]), np.array(["flow.head"])
-    for call in (repro.check, partial(repro.solve, progress=np.bool_(False))):
-        assert call("flow_only", np.array(["pore.width=40 um"])) is not None
-    assert repro.load_scene("base", changes, unset=unset) == repro.load_scene("base", list(changes), unset=list(unset))
-    assert repro.load_scene("base", unset=("flow.head",), overrides=("flow.mean_velocity=1 m/day",)).flow.head is None
-    outline = np.array([[-5.0, 0], [0, 5], [5, 0]])
-    assert next(repro.simulate("base", SHORT, shape=outline, unset=[])).pore.outline.thickness == pytest.approx(5)
 
 
 class Stand:

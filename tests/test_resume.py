@@ -59,10 +59,6 @@ THOROUGH_SCENES = {
     "to the pore's end": ("aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=1 h", "growth.end=9 h",
                           "numerics.refinement=0.5"),
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
-    "quadratic, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0005", *CONTACT,
-                           'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
-    "paper": ('growth.end="6 h"',),
-    "accurate": ('numerics.preset="accurate"', 'growth.end="4 h"'),
     "gear with forces": ("numerics.refinement=0.3", 'numerics.transport="gear"', 'growth.fluid_forces="included"',
                          'growth.end="0.6 h"'),
     "fast, stress-free": ('numerics.preset="fast"', 'growth.new_biomass="stress_free"', *CONTACT),
@@ -101,34 +97,6 @@ def check_parts(scene, folder):
 def test_a_run_stopped_after_every_step_equals_the_uninterrupted_run(tmp_path, name):
     """No warning occurs."""
     check_parts(load_scene("base", {**SCENES, **THOROUGH_SCENES}[name]), tmp_path)
-
-
-@pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*BRIEF), "--force", "--out"]],
-                         ids=["go on", "anew"])
-@pytest.mark.parametrize("content, why", [
-    (None, "there is no run.json|it contains 'thesis.tex', which is not of a run; give a new folder"),
-    ("[" * 100_000, "run.json cannot be read"), ("null", "run.json cannot be read: it is not a JSON object"),
-    ('{"files": "thesis.tex"}', "run.json cannot be read: its checksum is wrong|run.json lists no files of a run")])
-def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, arguments):
-    """The status is 2, one line describes the folder and the remedy, and nothing changes."""
-    (tmp_path / "thesis.tex").write_text("years of work")
-    if content is not None:
-        (tmp_path / "run.json").write_text(content)
-    message = refusal(tmp_path, capsys, *arguments, tmp_path)
-    assert re.search(why, message)
-    assert content is None or "--resume" in arguments or "another" in message
-
-
-def test_a_damaged_finished_run_resumes_from_its_remaining_checkpoint(tmp_path, capsys):
-    """A message reports it."""
-    out = tmp_path / "run"
-    interrupt_run(SCENE, out)
-    rewrite(out, status="completed")
-    flip(out / "timeseries.csv")
-    assert resume_run(out) == 0
-    message = capsys.readouterr().err
-    assert "timeseries.csv is missing, cut short or altered" in message and "resumes from its checkpoint" in message
-    assert matches_uninterrupted(SCENE, out) and read_record(out)["status"] == "completed"
 
 
 def test_every_bit_of_a_finished_run_is_checked(tmp_path, capsys):
@@ -178,16 +146,22 @@ def test_check_reports_an_unfinished_run(tmp_path, capsys):
         main(["check", str(tmp_path / "run"), "--set", "growth.end=5 h"])
 
 
-def test_an_altered_checkpoint_is_refused_and_the_previous_one_is_used(tmp_path, capsys):
-    """The results stay the same."""
+@pytest.mark.parametrize("file, message", [
+    ("timeseries.csv", "timeseries.csv is missing, cut short or altered.* resumes from its checkpoint"),
+    (NEWEST, f"{NEWEST}: refused: its checksum is wrong")])
+def test_a_damaged_run_resumes_from_its_last_good_checkpoint(tmp_path, capsys, file, message):
+    """A message reports the damage, of a table although the run is marked as finished, or of the newest checkpoint. The
+    results stay the same."""
     out = tmp_path / "run"
     interrupt_run(SCENE, out)
-    intact = (out / NEWEST).read_bytes()
-    (out / NEWEST).write_bytes(intact[:-1] + bytes([intact[-1] ^ 1]))
+    if file != NEWEST:
+        rewrite(out, status="completed")
+    flip(out / file)
     assert resume_run(out) == 0
-    message = capsys.readouterr().err
-    assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
-    assert matches_uninterrupted(SCENE, out) and read_record(out)["resumes"][0]["time_h"] > 0
+    err = capsys.readouterr().err
+    assert re.search(message, err) and "t = 0" not in err
+    assert matches_uninterrupted(SCENE, out) and read_record(out)["status"] == "completed"
+    assert read_record(out)["resumes"][0]["time_h"] > 0
 
 
 def test_a_change_of_versions_is_reported_and_recorded(tmp_path, monkeypatch):
@@ -294,24 +268,18 @@ def test_a_resume_under_other_conditions_is_reported(key, tmp_path, monkeypatch,
 SETS = flags(*BRIEF)
 
 
-def test_a_finished_run_is_left_unchanged(tmp_path, capsys):
-    """The same command, or a resume, reports this with status 0, and computes and writes nothing."""
-    arguments = ["run", "base", *SETS, "--out", str(tmp_path / "run")]
-    assert main(arguments) == 0
-    before = state(tmp_path / "run")
-    for repeated in (arguments, ["run", "--resume", str(tmp_path / "run")]):
-        capsys.readouterr()
+def test_the_same_command_resumes_a_run_and_leaves_a_finished_one_unchanged(tmp_path, capsys):
+    """It starts from the checkpoint of an interrupted run, with the bits of the uninterrupted one. Then it reports with
+    status 0 that the run is finished, and so does a resume; both write nothing."""
+    out = tmp_path / "run"
+    interrupt_run(SCENE, out)
+    arguments = ["run", "base", *SETS, "--out", str(out)]
+    assert main(arguments) == 0 and "resumes from t = " in capsys.readouterr().err
+    assert matches_uninterrupted(SCENE, out) and read_record(out)["resumes"][0]["time_h"] > 0
+    before = state(out)
+    for repeated in (arguments, ["run", "--resume", str(out)]):
         assert main(repeated) == 0
-        assert "completed, already finished" in capsys.readouterr().out and state(tmp_path / "run") == before
-
-
-def test_an_interrupted_run_is_resumed(tmp_path, capsys):
-    """It starts from its checkpoint, with the bits of the uninterrupted run."""
-    interrupt_run(SCENE, tmp_path / "run")
-    pages.run(tmp_path, "base", *BRIEF)
-    assert "resumes from t = " in capsys.readouterr().err
-    assert matches_uninterrupted(SCENE, tmp_path / "run")
-    assert read_record(tmp_path / "run")["resumes"][0]["time_h"] > 0
+        assert "completed, already finished" in capsys.readouterr().out and state(out) == before
 
 
 def test_another_scene_is_refused_with_its_differences(tmp_path, capsys):

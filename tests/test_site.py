@@ -15,12 +15,10 @@ from paper_figures import FIGURES
 from tests import browser
 from tests.blocks import ROOT
 from tests.test_published import QUESTIONS
-from verification.claims import EXPECTED
 
 SITE = ROOT / "docs" / "_build" / "html"
 PAGES = sorted(path for path in SITE.rglob("*.html") if "_static" not in path.parts and path != SITE / "index.html")
 CASES = SITE / "verification" / "report" / "REPORT.html"
-REGISTER = SITE / "paper_figures" / "register.html"
 pytestmark = [pytest.mark.thorough, pytest.mark.skipif(browser.CHROMIUM is None, reason="Chromium is not installed"),
               pytest.mark.skipif(not PAGES, reason="make docs has built no site")]
 
@@ -140,30 +138,6 @@ def test_the_index_of_cases_has_menus(window):
     assert 1 < len(shown) < 20
     for stage, kind, elements, equations in shown:
         assert (stage, kind) == ("flow", "exact") and "2" in elements.split("; ") and "(1)-(6)" in equations
-
-
-def test_the_register_of_claims_sorts_and_filters(window):
-    """It sorts by verdict, with equal verdicts in the order of the claims, and back by number. A filter hides rows."""
-    window.show(REGISTER)
-    table = "document.querySelector('#claims table')"
-    heading = f"{table}.tHead.rows[0].cells"
-    rows = f"[...{table}.tBodies[0].rows]"
-    texts = f"{rows}.map(row => row.cells[%d].innerText.trim())"
-    claims = window.run(texts % 0)
-    assert claims == sorted(claims) and len(claims) == len(EXPECTED)
-    window.run(f"{heading}[3].click()")
-    verdicts = window.run(texts % 3)
-    assert verdicts == sorted(verdicts) and len(set(verdicts)) > 3 and window.run(texts % 0) != claims
-    assert window.run(f"{heading}[3].getAttribute('aria-sort')") == "ascending"
-    window.run(f"{heading}[0].focus()")
-    for order in (claims, claims[::-1]):
-        window.press("Enter")
-        assert window.run(texts % 0) == order
-    window.run("field = document.querySelector('#claims .table-filter');"
-               "field.value = 'Contradicted effluent'; field.dispatchEvent(new Event('input'))")
-    shown = window.run(f"{rows}.map(row => [row.offsetParent !== null, row.textContent.toLowerCase()])")
-    assert all(visible == ("contradicted" in text and "effluent" in text) for visible, text in shown)
-    assert 1 < sum(visible for visible, _ in shown) < len(claims) / 2
 
 
 def test_the_keyboard_alone_opens_a_page(window):

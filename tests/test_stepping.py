@@ -283,13 +283,18 @@ def test_a_shape_leans_as_the_flow_at_the_end_of_its_step_pushes(time):
 
 @pytest.mark.parametrize("scheme", [stepping.STEPPING, updates.STEPPING], ids=["midpoint", "updates"])
 def test_the_solution_after_a_step_to_a_jump_is_that_before_it(scheme):
-    """The ends of the model are judged with it, and then with the solution after the jump."""
-    scene, pore = coarse_base(2, 'flow.head=[["0 h", "4e-3 cm"], ["0.2 h", "1e-3 cm"]]')
-    solved = solve(scene, pore)
-    step, after = scheme.cut(Stages.of(scene), pore, solved, 0.2)
+    """The ends of the model are judged with it and with the shape under its forces, and then with those after the
+    jump."""
+    scene, pore = coarse_base(2, 'flow.head=[["0 h", "4e-3 cm"], ["0.2 h", "1e-3 cm"]]',
+                              "growth.fluid_forces=included", 'growth.shear_modulus="1e-4 MPa"')
+    stages, solved = Stages.of(scene), solve(scene, pore)
+    step, after = scheme.cut(stages, pore, solved, 0.2)
     assert step.pore.time == 0.2
     assert after.mean_velocity == pytest.approx(solved.mean_velocity, rel=0.05)
     assert solve(scene, step.pore).mean_velocity == pytest.approx(after.mean_velocity / 4)
+    earlier, _ = scheme.cut(stages, pore, solved, 0.199)
+    leans = [each.pore.outline.upstream + each.pore.outline.downstream for each in (step, earlier)]
+    assert leans[0] == pytest.approx(leans[1], rel=0.02) and leans[1] > 1e-4
 
 
 def test_a_step_grows_as_much_on_a_new_mesh_half_way():

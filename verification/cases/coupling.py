@@ -212,28 +212,6 @@ def _unround(instant, area: float) -> float:
     return np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max()
 
 
-#: Power of the length in the unit of each number.
-POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
-
-
-@pytest.mark.case("coupling-units", kind="property", mutants=("length-scale",), runs_with="paper")
-@parametrize("*changes", runs.EVERY)
-def test_units(changes, record):
-    """A pore eight times larger or smaller, with scaled transport, grows in the same way to the last bits: the code
-    contains no length.
-
-    Norm: relative difference at 2 h.
-    """
-    scene = runs.base("2 h", *changes)
-    reference = runs.numbers(runs.last(scene))
-    for factor in (8.0, 0.125):
-        scaled_numbers = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
-        differences = {name: abs(scaled_numbers[name] / value / factor ** POWERS[name] - 1)
-                       for name, value in reference.items()}
-        record(each_at_most(differences, 1e-14, "powers of two are exact, also in the mesher",
-                            f", lengths times {factor:g}"))
-
-
 #: The scene base to 1 h in other units.
 FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5e-6 m"', 'flow.head="1e-5 m"',
            'substrates.acceptor.supply="10 g/m^3"', 'substrates.donor.supply="0.01 g/L"',

@@ -185,60 +185,8 @@ def _whole_run(factor: float, preset: str) -> dict[str, float]:
     return {"size": thiele(scene), **runs.differences(scene, runs.reports_of(scene), moments)}
 
 
-#: Refinement, time step (min), and factor of the cells of the averaged pore: as in the base run, and twice as fine.
-COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-averaged-refined", kind="cross-code", mutants=("rates-at-the-start",),
-    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
-@pytest.mark.parametrize("elements", runs.ELEMENTS)
-def test_averaged_refined(elements, record):
-    """The difference from the averaged pore is one of the models: it does not change if both codes are refined.
-
-    Norm: change of the difference, over itself, if mesh, step and FiPy's cells are halved: area, effluents and
-    section means of C; 2 h from 20 um at 2.9 m/d.
-    """
-    coarse, fine = (_piece(elements, *level) for level in (COARSE, FINE))
-    record([at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
-                    "error in space 0.1 % of the loss, in time 0.2 % of an hour's growth") for name in COMPARED])
-
-
-def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict[str, float]:
-    """Differences from the averaged pore after 2 h."""
-    scene = runs.base("2 h", 'aggregate.radius="20 um"', runs.with_elements(elements),
-                      runs.coarser(elements, 0.45 * refinement, refinement),
-                      f'growth.time_step="{minutes} min"')
-    scene = runs.at_velocity(scene, runs.SPEED)
-    moments = runs.half_disc(scene, cells=finer * runs.CELLS).run((2.0,))
-    return runs.differences(scene, runs.reports_of(scene), moments)
-
-
 WIDTH, THICKNESS = 20.0, 5.0
-ASPECTS = (0.5, 0.25, 0.125, 0.0625)
 THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-averaged-strip", kind="cross-code", mutants=("growth-spread-evenly",),
-    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
-@pytest.mark.parametrize("elements", runs.ELEMENTS)
-def test_averaged_strip(elements, record):
-    """Thin aggregates that are starved downstream grow like the averaged pore (FiPy, solve_ivp) with a stress-free
-    strip, up to the square of the aspect ratio.
-
-    Norm: largest difference at 0.5 and 1 h: area relative, effluents and section means of C over the supply; seeds of 5
-    um, thickness over half length 1/2 to 1/16, u proportional to that ratio and X_m to its square, so that the averaged
-    pore starts from the same state.
-    """
-    errors = refine(_strip, ASPECTS, elements)
-    record(studies(errors, dict.fromkeys(COMPARED, (2, THIN_SQUARE, 4e-4))),
-           at_most("ends of the thinnest, relative", errors["ends"][-1], 1.5e-4,
-                   "stretches: as the square of the aspect ratio"),
-           between("lean upstream over that of the averaged pore, 0.27 %", errors["lean"][-1], 0.97, 1.03,
-                   "the same: 0.4 %, and as much for the step in time"))
 
 
 def thin_scene(elements: str, aspect: float, speed: float = 5 * runs.SPEED, density: float = 3e6) -> Scene:
@@ -253,24 +201,10 @@ def thin_scene(elements: str, aspect: float, speed: float = 5 * runs.SPEED, dens
     return runs.at_velocity(scene, speed * aspect)
 
 
-def _strip(aspect: float, elements: str) -> dict[str, float]:
-    """Aspect ratio; largest differences; that of the ends, relative; lean over that of the averaged pore.
-
-    The lean is the upstream over the downstream length, less 1.
-    """
-    scene = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
-    seed, *instants = simulate(scene)
-    moments = strip_of(scene, seed.pore.outline.area, 2 * runs.CELLS).run(scene.output.times)
-    ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
-    lean, expected_lean = -ends[:, 0] / ends[:, 1] - 1
-    return {"size": aspect, **runs.differences(scene, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),
-            "lean": lean / expected_lean}
-
-
 def strip_of(scene: Scene, area: float, cells: int) -> averaged_pore.Averaged:
     """The averaged run of a strip with the area of the meshed seed."""
     lengths, heights = averaged_pore.half_ellipse(2 * area / (np.pi * THICKNESS), THICKNESS, cells)
-    return averaged_pore.Averaged(runs.pore_of(scene), lengths, heights, 4 * cells, keeps_shape=False)
+    return averaged_pore.Averaged(runs.pore_of(scene), lengths, heights, 4 * cells)
 
 
 def half_ellipse(elements: str, aspect: float) -> np.ndarray:

@@ -31,18 +31,13 @@ from verification.cases import flow as flow_cases
 from verification.cases import flow_properties
 from verification.cases.flow import ENDS, ENDS_FIRST, FORMS, RATIO, SECOND, WIDTH
 from verification.evidence.cases import combined, parametrize
-from verification.evidence.checks import at_most, each_at_most, refine, studies
+from verification.evidence.checks import at_most, refine, studies
 from verification.problems import meshes
 
 CORNER = 4
 #: Refinement of the package's mesh on each level, where Taylor-Hood's elements are halved, and the number of meshes
 #: (see meshes.SPREAD).
 REFINEMENTS, DRAWS = (0.65, 1.3, 2.6, 5.2), dict(enumerate((3, 3, 3, 1)))
-FILM_REFINEMENTS, FILM_DRAWS = (0.9, 1.8, 3.6, 7.2), dict(enumerate((3, 3, 2, 1)))
-#: Radius (um) of the half-disc that leaves a film, refinement of its curved mesh, and the compared quantities.
-FILM, FILM_CURVED = 41.0, 1.6
-IN_THE_FILM = ("velocity", "pressure in the fluid", "head loss")
-CODES = "0.1 % (cross-code)"
 NORM = ("root mean square over meshes of a size: L2 of the difference over that of Taylor-Hood's field, in the region; "
         "relative difference of the head loss")
 JUMP = "1/2: the pressure jumps at the interface, a continuous one cannot"
@@ -91,31 +86,6 @@ def test_half_disc(setup, record):
 def test_half_disc_traction(setup, record):
     """With continuous traction too the flow around a half-disc of 25 um is Taylor-Hood's, lambda = 10 and 2000."""
     record(half_disc(*setup))
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "flow-film", kind="cross-code", norm=NORM, mutants=("viscosity-swapped",), references=("poiseuille", "taylor_hood"))
-@parametrize("order, interface", {"order 1": (1, "laplacian"), **combined({"order 2": 2}, FORMS)})
-def test_film(order, interface, record):
-    """Through the film of 9 um that a half-disc of 41 um leaves open, lambda = 2000, the flow is Taylor-Hood's, with
-    elements of every order.
-
-    Record differences without orders.
-
-    Elements grow from the walls of the film to its middle at every refinement, so no single size describes a mesh.
-    """
-    if order > 1:
-        space = meshes.half_disc_space(FILM, FILM_CURVED, ENDS, WIDTH, order)
-        solution = flow.unit_flow(space, Viscous(RATIO), interface=interface_of(interface))
-        differences = _differences(space, solution, _reference_flow(FILM, RATIO, interface, [*DRAWS][-1]))
-        record(each_at_most({name: differences[name] for name in IN_THE_FILM}, 1e-3, CODES))
-        return
-    errors = refine(_level, FILM_DRAWS, FILM_REFINEMENTS, FILM, RATIO, interface)
-    ratios = {name: (errors[name][1:] / errors[name][:-1]).max() for name in IN_THE_FILM}
-    record(each_at_most({name: errors[name][-1] for name in IN_THE_FILM}, 1e-3, CODES, ", finest meshes"),
-           each_at_most(ratios, 0.6, "both codes refined twofold: a half is first order, and the film's elements are "
-                        "refined later", ", largest ratio of neighbours"))
 
 
 @cache

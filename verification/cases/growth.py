@@ -388,40 +388,6 @@ def _theta(x, y):
     return 2.6 + 0.9 * x / bodies.RADIUS + 0.5 * np.sin(3 * y / bodies.RADIUS)
 
 
-#: Angles of rotation, rad.
-ANGLES = np.array([0.4, 1.9, 4.0])
-
-
-@pytest.mark.case("growth-rigid", kind="property", mutants=("untransposed",))
-@parametrize("kind", bodies.EVERY)
-def test_rigid(kind, record):
-    """The nodal forces of any state of a body have no resultant and no moment, and rotate with the body by any angle;
-    the residual of the volume does not change (objectivity).
-
-    Norm: largest sum, over the largest nodal force; largest difference, over the same.
-    """
-    body, _ = bodies.half_disc(1.0 if kind == 1 else 0.5, kind)
-    random, x = np.random.default_rng(11), body.reference
-    place = 6 * x @ np.array([[1.1, -0.3], [0.6, 0.9]]) + 0.3 * random.standard_normal(x.shape)
-    pressure, theta = random.standard_normal(body.corners), body.field(_theta)
-    forces, volume = _forces(body, place, pressure, theta)
-    scale = largest(forces)
-    moment = np.sum(place * (forces @ TURN)) / largest(place)
-    record(each_at_most({"resultant": largest(forces.sum(axis=0)) / scale,
-                         "moment over the largest distance": abs(moment) / scale}, 1e-11, NEWTON_ROUND_OFF))
-    for angle, Q in zip(ANGLES, _turns(ANGLES)):
-        rotated_forces, rotated_volume = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
-        record(each_at_most({"forces": largest(rotated_forces - forces @ Q.T) / scale,
-                             "volume": largest(rotated_volume - volume) / largest(volume)}, 1e-12, ROUND_OFF,
-                            f", {angle:g} rad"))
-
-
-def _forces(body: Supported, place, pressure, theta):
-    """Nodal forces (n, 2), and the residual of J = theta (corners,)."""
-    forces, volume = np.split(bodies.system(body, place, pressure, theta).residual(place, pressure), [place.size])
-    return forces.reshape(2, -1).T, volume
-
-
 #: Refinements of each kind, and factors of theta.
 GROWN = {1: ((0.6, 1.0), (1.0, 15.0), (1.5, 500.0)), 2: ((0.3, 1.0), (0.6, 15.0))}
 

@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 
 from reference import quadratic_mesh_motion, sliding_waves
-from repro.fem import outline
 from repro.fem.mesh import Mesh, curved
-from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
-from repro.fem.walls import BOTTOM, FREE, channel_walls
+from repro.fem.walls import channel_walls
 from repro.model import mesh_motion
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import at_least, at_most, largest, refine, studies, study
@@ -140,17 +138,12 @@ def _wave_error(size: float, seed: int, gamma: float, geometry: int, label: str)
 
 
 RADIUS = 25.0
-#: Width of the pores around aggregates, and ends of the pore around a segment of a disc (um).
-PORE, SEGMENT_END = 50.0, 50.0
+#: Width of the pore, and its ends (um).
+PORE, DISC_END = 50.0, 50.0
 #: Refinements of the package's mesh with the divisions of the reference. Both codes are refined.
 LEVELS = ((0.7, 6), (1.1, 8), (1.9, 12), (3.3, 16))
-CORNER_LEVELS = ((0.7, 8), (1.3, 12), (2.4, 16), (4.4, 24))
-#: Contact angle of the second aggregate. The angle of the fluid, 120 degrees, makes the corner singular.
-CONTACT = np.radians(60)
-BOTH = "0.1 % between codes"
-
-
-SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y: np.array([RADIUS + 0 * x, 0 * y])}
+WHY = "linear elements: second order, no singular corner (mirror images); 0.1 % between codes"
+DISC_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y: np.array([RADIUS + 0 * x, 0 * y])}
 
 
 @pytest.mark.slow
@@ -164,61 +157,24 @@ def test_half_disc(geometry, record):
 
     Norm: L2 of the difference of the whole displacement over that of the displacement.
     """
-    for name, gamma in product(SEGMENT_MOTIONS, GAMMAS):
-        record(_comparison(geometry, np.pi / 2, LEVELS, name, gamma, 2,
-                         "linear elements: second order, no singular corner (mirror images)", f"{name}, "))
+    for name, gamma in product(DISC_MOTIONS, GAMMAS):
+        differences = refine(_difference, LEVELS, geometry, gamma, name)
+        record(study(f"{name}, gamma = {gamma:g}", differences["size"], differences["apart"], 2, WHY, ceiling=1e-3))
 
 
-def _comparison(geometry: int, contact: float, levels, motion: str, gamma: float, order: float, why: str,
-                name: str = ""):
-    """The study of one motion."""
-    differences = refine(_difference, levels, contact, geometry, gamma, motion)
-    return study(f"{name}gamma = {gamma:g}", differences["size"], differences["apart"], order, f"{why}; {BOTH}",
-                 ceiling=1e-3)
+#: Cached: straight and curved triangles share the reference, and several motions a mesh.
+_reference_motion, _disc = cache(quadratic_mesh_motion.follow), cache(meshes.half_disc)
 
 
-@pytest.mark.slow
-@pytest.mark.case(
-    "mesh_motion-corner", kind="cross-code", mutants=("gamma-inverted",), references=("quadratic_mesh_motion",))
-@parametrize("geometry", EITHER)
-def test_corner(geometry, record):
-    """Around an aggregate whose contact angle is 60 degrees the order falls to twice the exponent of the fluid's corner
-    of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes are refined.
-
-    Norm: L2 of the difference of the whole displacement over that of the displacement.
-    """
-    record([_comparison(geometry, CONTACT, CORNER_LEVELS, "grows", gamma,
-                      2 * quadratic_mesh_motion.exponent(np.pi - CONTACT, gamma),
-                      "2 z, displacement like r^z at the corner") for gamma in GAMMAS])
-
-
-@cache
-def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
-    """A mesh around a segment of a disc that meets the wall at an angle. pi/2 gives the half-disc."""
-    height = RADIUS * (1 - np.cos(contact))
-    half = int(np.ceil(contact * RADIUS / height * ACROSS_AGGREGATE * refinement))
-    turn = np.linspace(np.pi / 2 - contact, np.pi / 2 + contact, 2 * geometry * half + 1)
-    arc = RADIUS * np.column_stack([np.cos(turn), np.sin(turn) - np.cos(contact)])
-    base = arc[0, 0] * np.linspace(-1, 1, 4 * geometry + 1)
-    points = np.vstack([np.column_stack([base, 0 * base]), arc[1:-1]])
-    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
-    fixed = np.arange(len(points)) == 2 * geometry
-    segment = outline.Outline(points, wall, fixed, points, geometry)
-    return meshes.around(segment, refinement, (-SEGMENT_END, SEGMENT_END), PORE)[0]
-
-
-#: Cached: straight and curved triangles share the reference.
-_reference_motion = cache(quadratic_mesh_motion.follow)
-
-
-def _difference(level: tuple[float, int], contact: float, geometry: int, gamma: float, name: str) -> dict[str, float]:
+def _difference(level: tuple[float, int], geometry: int, gamma: float, name: str) -> dict[str, float]:
     """Element size, and relative difference of both codes on a level.
 
     The displacement is linear in the motion, which may be as large as the aggregate.
     """
     refinement, parts = level
-    grid, motion = _segment(contact, refinement, geometry), SEGMENT_MOTIONS[name]
-    reference = _reference_motion(RADIUS, contact, PORE, SEGMENT_END, parts, gamma, motion)
+    grid = _disc(RADIUS, refinement, (-DISC_END, DISC_END), PORE, geometry=geometry)
+    motion = DISC_MOTIONS[name]
+    reference = _reference_motion(RADIUS, PORE, DISC_END, parts, gamma, motion)
     moved_by = moved(grid, grid.points + motion(*grid.points.T).T, gamma) - grid.points
     computed = meshes.field_at(Space(grid), moved_by, reference.points)
     return {"size": meshes.mean_size(grid),

@@ -10,7 +10,6 @@ with a triangle across the curve is refused.
 Fields of order 1 or 2 have norms of their errors and values at points.
 """
 
-from dataclasses import replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -86,14 +85,12 @@ def space_on(grid: Mesh, order: int) -> Space:
     return Space(grid if order == grid.geometry else curved(grid, None))
 
 
-def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
-    """The package's mesh around a half-disc on the lower wall, sheared by ``lean``.
+def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1) -> Mesh:
+    """The package's mesh around a half-disc on the lower wall.
 
     Triangles are straight (geometry 1) or curved (2). The thinnest resolved film is 2 um thick.
     """
-    upright = seed(radius, refinement, geometry)
-    points = upright.points + lean * upright.points[:, [1]] * [1.0, 0.0]
-    return around(replace(upright, points=points, origin=points), refinement, ends, width)[0]
+    return around(seed(radius, refinement, geometry), refinement, ends, width)[0]
 
 
 def seed(radius: float, refinement: float, order: int = 1) -> outline.Outline:

@@ -266,8 +266,7 @@ def half_disc(scene: Scene, speed=None, cells: int = CELLS) -> averaged_pore.Ave
     from reference import averaged_pore
 
     radius = half_disc_radius(seeded(scene).outline.area)
-    return averaged_pore.Averaged(pore_of(scene, speed), *averaged_pore.half_ellipse(radius, radius, cells), 3 * cells,
-                                  keeps_shape=True)
+    return averaged_pore.Averaged(pore_of(scene, speed), *averaged_pore.half_ellipse(radius, radius, cells), 3 * cells)
 
 
 def reports_of(scene: Scene) -> list[Report]:
