@@ -318,7 +318,10 @@ def with_line_size(scene, pore, size, advances, factor=1.3):
 
 def test_lines_have_small_triangles_where_they_go(plugged):
     """The arcs ahead are 2 to 3 um long, and lines that travel 5 um err by 0.1 um on them. With small triangles their
-    places converge, whatever place was expected. The material keeps its nodes and its masses."""
+    places converge, whatever place was expected. The material keeps its nodes and its masses.
+
+    Triangles of 0.2 to 0.0125 um place the lines within 0.011 um of each other: a third of the bound, which lies between
+    this and the error on large triangles. It was 0.02 um for a state whose theta varied by half, on a rough new mesh."""
     scene, pore = plugged
     coarse = expanded_by(scene, pore, 1.3)
     far = {key: 1.2 * advance for key, advance in coarse.advances.items()}
@@ -326,7 +329,7 @@ def test_lines_have_small_triangles_where_they_go(plugged):
                for size, advances in ((0.1, coarse.advances), (0.1, far), (0.05, coarse.advances))]
     lengths = np.array([[shape.advances[0, TOP, side] for side in (1, -1)] for shape in (coarse, *reached)])
     exact = lengths[-1]
-    assert np.abs(lengths[0] - exact).max() > 0.02 > 3 * np.abs(lengths[1:3] - exact).max()
+    assert np.abs(lengths[0] - exact).max() > 0.04 > 3 * np.abs(lengths[1:3] - exact).max()
     for shape in reached:
         outline = shape.pore.boundary
         ends = outline.contact_ends & (outline.wall == TOP)
