@@ -320,8 +320,8 @@ def test_lines_have_small_triangles_where_they_go(plugged):
     """The arcs ahead are 2 to 3 um long, and lines that travel 5 um err by 0.1 um on them. With small triangles their
     places converge, whatever place was expected. The material keeps its nodes and its masses.
 
-    Triangles of 0.2 to 0.0125 um place the lines within 0.011 um of each other: a third of the bound, which lies between
-    this and the error on large triangles. It was 0.02 um for a state whose theta varied by half, on a rough new mesh."""
+    Triangles of 0.2 to 0.0125 um place the lines within 0.011 um of each other. The bound is three times this, and half
+    of the error on large triangles. It was 0.02 um for a state whose theta varied by half, on a rough new mesh."""
     scene, pore = plugged
     coarse = expanded_by(scene, pore, 1.3)
     far = {key: 1.2 * advance for key, advance in coarse.advances.items()}
