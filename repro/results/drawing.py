@@ -6,7 +6,6 @@ import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from repro.errors import printable
 from repro.results import names, outlines, quantities
 from repro.results.files import output_path
 from repro.results.jumps import with_jumps
+from repro.scene.needed import package
 from repro.scene.units import to_internal
 
 if TYPE_CHECKING:
@@ -76,14 +76,8 @@ class Style:
 PLAIN = Style()
 
 
-def optional(module: str) -> Any:
-    """Import a module of matplotlib or Pillow. Raises ImportError with the packages to install.
-    """
-    try:
-        return import_module(module)
-    except ImportError:
-        raise ImportError("the package matplotlib is not installed; "
-                          "pip install matplotlib pillow") from None
+#: Imports a module of matplotlib or Pillow. Raises ImportError with the packages to install.
+optional = partial(package, install="matplotlib pillow")
 
 
 def full_name(name: str, known: Sequence[str]) -> str:

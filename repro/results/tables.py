@@ -6,7 +6,6 @@ import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from html import escape
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +23,7 @@ from repro.results.outlines import Outline
 from repro.results.quantities import plain as unit
 from repro.scene import Scene, Source, bodies, load_scene, scene_tables
 from repro.scene.arguments import Overrides, typed
+from repro.scene.needed import package
 from repro.scene.units import to_internal
 from repro.schemes import Scheme
 from repro.timing import progress_bar
@@ -741,14 +741,6 @@ def _photograph(image: Any, um_per_pixel: float | None,
 def _html_row(head: str, values: np.ndarray) -> str:
     cells = "".join(f"<td>{value:.4g}</td>" for value in values)
     return f"<tr><th>{escape(head)}</th>{cells}</tr>"
-
-
-def package(name: str):
-    """Import an optional package. Raises ImportError, in one line, if it is not installed."""
-    try:
-        return import_module(name)
-    except ImportError:
-        raise ImportError(f"the package {name} is not installed; pip install {name}") from None
 
 
 @typed

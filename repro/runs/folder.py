@@ -151,14 +151,13 @@ def refuse_null(folder: Path) -> None:
 
 
 @contextmanager
-def folder_errors(folder: Path, kind: type[OutputError] = OutputError) -> Iterator[None]:
-    """Convert errors of the file system into an OutputError of a kind, for the folder."""
+def folder_errors(folder: Path) -> Iterator[None]:
+    """Convert errors of the file system into OutputError for the folder."""
     try:
         yield
     except OSError as error:
-        reason = error.strerror or error
-        expected = "a folder that can be written is needed"
-        raise kind(f"--out {folder}: {reason}; {expected}") from error
+        raise OutputError(f"--out {folder}: {error.strerror or error}; a folder that can be "
+                          "written is needed") from error
 
 
 @contextmanager

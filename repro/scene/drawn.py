@@ -8,10 +8,10 @@ import csv
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from repro.scene.needed import package
 from repro.scene.rules import FINEST
 from repro.scene.units import MOST_POINTS, Drawn, Refused
 
@@ -105,9 +105,9 @@ def _mask(drawn: Drawn, width: float) -> Shape:
     from shapely import box, unary_union
 
     try:
-        images = import_module(PILLOW)
-    except ImportError:
-        raise Refused("the package pillow is not installed; pip install pillow") from None
+        images = package(PILLOW, "pillow")
+    except ImportError as error:
+        raise Refused(str(error)) from None
     with images.open(drawn.file, formats=["PNG"]) as image:
         if image.width * image.height > MOST_PIXELS:
             raise Refused(f"{drawn.file}: more than {MOST_PIXELS} pixels")
