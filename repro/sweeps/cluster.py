@@ -44,8 +44,8 @@ def ready(address: str) -> Iterator[RunPoints]:
         with ThreadPoolExecutor(1) as thread:  # a notebook has its own event loop in this one
             thread.submit(lambda: asyncio.run(_ask(distributed, address))).result()
     except Exception as error:  # another kind of server may cause any error
-        raise OutputError(f"--scheduler {address}: no Dask scheduler answers there; an address such "
-                         "as tcp://host:8786 is needed") from error
+        raise OutputError(f"--scheduler {address}: no Dask scheduler answers there; an address "
+                          "such as tcp://host:8786 is needed") from error
     with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
         yield partial(run_points, client=client, address=address)
 
@@ -67,8 +67,8 @@ async def _ask(distributed, address: str) -> None:
 def run_points(points: Sequence[Point], folder: Path, client, address: str) -> EndedRuns:
     """Make the runs in `folder`.
 
-    Raises OutputError if the cluster has no workers, or if they have another version of this package
-    or do not share the folder.
+    Raises OutputError if the cluster has no workers, or if they have another version of this
+    package or do not share the folder.
     """
     folder = folder.resolve()
     _check_workers(client, folder, address)
@@ -88,11 +88,12 @@ def _check_workers(client, folder: Path, address: str) -> None:
         raise OutputError(f"--scheduler {address}: a worker lacks this package ({error})") from None
     for worker, (worker_code, shared) in answers.items():
         if worker_code != single_run.code():
-            raise OutputError(f"--scheduler {address}: the worker {worker} has version {worker_code}"
-                             f" of this package, this is {single_run.code()}; the same is needed")
+            raise OutputError(f"--scheduler {address}: the worker {worker} has version "
+                              f"{worker_code} of this package, this is {single_run.code()}; the "
+                              "same is needed")
         if not shared:
-            raise OutputError(f"--scheduler {address}: the worker {worker} does not see {folder}; a "
-                             "folder on a file system that all share is needed")
+            raise OutputError(f"--scheduler {address}: the worker {worker} does not see {folder}; "
+                              "a folder on a file system that all share is needed")
 
 
 def inspect_worker(path: str) -> tuple[str, bool]:

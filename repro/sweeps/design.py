@@ -221,7 +221,8 @@ def points(source: Source, sets: list[str], factors: list[Factor], combinations:
         point = Point(index, values, scene)
         twin = first.setdefault(point.hash, index)
         if twin != index:
-            raise SceneError(f"{run_label}: the same scene as run {twin}; each run once is accepted")
+            raise SceneError(f"{run_label}: the same scene as run {twin}; each run once is "
+                             "accepted")
         runs.append(point)
     return runs
 

@@ -74,8 +74,8 @@ def _check(sweep: Sweep) -> None:
     if folder.is_dir() and not os.path.lexists(folder / "sweep.json"):
         foreign = sorted({path.name for path in folder.iterdir()} - {"runs", LOCK})
         if foreign:
-            raise OutputError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a sweep; a "
-                              "new or empty folder, or one of the same sweep, is accepted")
+            raise OutputError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a sweep; "
+                              "a new or empty folder, or one of the same sweep, is accepted")
         return
     if not folder.exists():
         return

@@ -100,8 +100,8 @@ def _key(factor: Factor, runs: list[SweepRun], k: int) -> str:
     if len(values) > 2 * LEVELS:
         last = len(values) - 1
         values = [values[round(i * last / (LEVELS - 1))] for i in range(LEVELS)]
-    entries = "".join(f"<li>{charts.swatch(_level(factor, value))}{escape(factor.short(value))}</li>"
-                      for value in values)
+    entries = "".join(f"<li>{charts.swatch(_level(factor, value))}"
+                      f"{escape(factor.short(value))}</li>" for value in values)
     return f'<ul class="key"><li>{escape(factor.key)}</li>{entries}</ul>'
 
 

@@ -102,7 +102,8 @@ NUMBERS = (
     Quantity("wall_time_s", "wall time", "that of run.json", lambda run: run.wall, "wall time"),
     Quantity("clogging_time_h", "time of clogging",
              "when conductivity_m_per_d over its first value has first fallen to --clogged; its "
-             "logarithm is linear between rows", lambda run: run.falls_to(run.clogged)[0], "clogged"),
+             "logarithm is linear between rows", lambda run: run.falls_to(run.clogged)[0],
+             "clogged"),
     Quantity("clogging_biomass", "biomass at clogging",
              "aggregate_area_um2 / (W L) then, linear between rows",
              lambda run: run.falls_to(run.clogged)[1], "biomass then"),
