@@ -7,7 +7,6 @@
     tables        results in Python
     permeability  laws for models on the Darcy scale
     drawing       curves, fields and films with matplotlib
-    netcdf        results as NetCDF, by `Results.to_netcdf`
 
 Writers use :func:`repro.results.files.atomic_path`, so that a file is complete or absent. An empty
 field of a table is a quantity that the scene does not model.

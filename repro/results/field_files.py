@@ -37,6 +37,12 @@ class Grid:
     cell_data: dict[str, np.ndarray] = field(default_factory=dict)
     time: float = 0.0
 
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays by name, as Python's results have them."""
+        return {"places_um": self.points[:, :2], "triangles": self.cells, **self.point_data,
+                **self.cell_data}
+
 
 def write(path: Path, grid: Grid) -> None:
     """Write a grid. Raises OSError if the file cannot be written."""

@@ -17,7 +17,7 @@ from repro.report import fields, reading
 from repro.results import field_files, provenance
 from repro.results.files import sha256_of
 from repro.results.quantities import none_if_nan
-from repro.results.tables import Results, arrays, fields_at
+from repro.results.tables import Results, fields_at
 from repro.runs import checkpoint, execution
 from repro.runs.execution import Watch, issue_warnings, origin_of
 from repro.runs.folder import PROVENANCE, read_sums
@@ -242,4 +242,4 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
             raise OutputError(f"{path}: the fields are cut short or altered since they were "
                               "written")
-        return arrays(field_files.read(path))
+        return field_files.read(path).arrays
