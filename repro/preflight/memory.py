@@ -138,7 +138,7 @@ def require_outline(scene: Scene) -> None:
     try:
         resolution(scene)
         curves = {place: shapely.Polygon(outline.corners.points)
-                  for place, outline in zip(scene.places, initial_outlines(scene))}
+                  for place, outline in zip(scene.aggregate_keys, initial_outlines(scene))}
     except MeshError as error:
         raise SceneError(f"{scene.name}: {with_advice(error)}") from error
     for place, curve in curves.items():

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 from repro.fem import sizing
 from repro.march.step_control import SHORTEST
@@ -122,7 +123,8 @@ def _cells(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 def _diffusivities(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if only one of two related values of Table 1 is changed."""
     for name, substrate in scene.substrates.modelled.items():
-        table = type(substrate)(supply=substrate.supply)
+        kind: Any = type(substrate)
+        table = kind()
         inside = substrate.diffusivity_in_aggregate
         if substrate.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
             yield Caveat(f"substrates.{name}.diffusivity_in_aggregate", "it still has the "
@@ -264,8 +266,8 @@ def _seed_film(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat
     share = min(1.0, gap / film(scene))
     nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.scheme.order
     if nodes < ACROSS_FILM:
-        place, seed = max(zip(scene.places, scene.aggregates), key=lambda each: each[1].height(
-            scene.pore.width))
+        place, seed = max(zip(scene.aggregate_keys, scene.aggregates),
+                          key=lambda each: each[1].height(scene.pore.width))
         key = f"{place}.radius" if seed.outline is None else f"{place}.outline"
         yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "
                      f"{nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its flow "
