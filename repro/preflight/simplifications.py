@@ -200,33 +200,27 @@ def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 
 
 def _fronts(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn of layers thinner than elements, and of fronts of zero order that elements widen: see
+    :meth:`RateLaw.on`."""
     thickness = sizes.thickness
-    nodes = _interface_size(scene, thickness) / scene.numerics.scheme.order
+    size = _interface_size(scene, thickness)
+    nodes = size / scene.numerics.scheme.order
+    front = THINNEST * math.sqrt(math.sqrt(3) / 4) * size  # equilateral triangles
     for uptake in numbers.uptakes(scene):
-        layer = uptake.layer
-        if uptake.law.sharp:
-            yield from _widened_front(scene, uptake, thickness)
-        elif layer < min(nodes, thickness):
+        layer, depth = uptake.layer, uptake.depth
+        lost = (front / depth) ** 2 if uptake.law.sharp and depth else 0.0
+        if lost > FRONT_LOSS:
+            yield Caveat("numerics.refinement", f"elements widen the front behind which there is "
+                         f"no {uptake.name} to {front:.2g} um, of {depth:.2g} um that the supply "
+                         f"reaches: uptake may be {100 * lost:.2g} % too small"
+                         + _resolving(resolution(scene) * (lost / FRONT_LOSS) ** 0.5))
+        elif not uptake.law.sharp and layer < min(nodes, thickness):
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
             yield Caveat("numerics.refinement", f"the {uptake.name} is used up in a {kind} "
                          f"of thickness (D K_s / (q X_m))^1/2 = {layer:.2g} um, thinner than the "
                          f"{nodes:.2g} um between nodes in the aggregate (a run checks the front "
                          "in its solution)" + _resolving(resolution(scene) * nodes / layer))
-
-
-def _widened_front(scene: Scene, uptake: numbers.Uptake,
-                   thickness: float) -> Iterator[Caveat]:
-    """The uptake of a layer that a front of zero order loses on elements of the interface's size:
-    see :meth:`RateLaw.on`."""
-    size = _interface_size(scene, thickness)
-    front = THINNEST * math.sqrt(math.sqrt(3) / 4) * size  # equilateral triangles
-    lost = (front / uptake.depth) ** 2 if uptake.depth else 0.0
-    if lost > FRONT_LOSS:
-        yield Caveat("numerics.refinement", f"elements widen the front behind which there is no "
-                     f"{uptake.name} to {front:.2g} um, of {uptake.depth:.2g} um that the supply "
-                     f"reaches: uptake may be {100 * lost:.2g} % too small"
-                     + _resolving(resolution(scene) * (lost / FRONT_LOSS) ** 0.5))
 
 
 def _interface_size(scene: Scene, thickness: float) -> float:

@@ -8,7 +8,6 @@ only its nodes or triangles, in ascending order.
 from __future__ import annotations
 
 import base64
-import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -28,8 +27,6 @@ MOST_NODES = 10_000  # of a frame; a finer mesh is shown on a regular grid of so
 #: The note on a frame of the grown aggregate before it expands (Plate 1).
 BEFORE = "before the expansion"
 LEVELS = 65534  # of a value; one more for no value
-_FILE = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
-
 #: The fields that a reader can choose, in this order.
 FIELDS = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
 theta J largest_principal_stress_MPa stress_xx_MPa stress_yy_MPa stress_zz_MPa stress_xy_MPa
@@ -54,7 +51,7 @@ def listed_files(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Pa
     except (OSError, ElementTree.ParseError) as error:
         raise OutputError(f"{folder / name}: it cannot be read: {error}") from error
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
-    return [(time, folder / name) for time, name in named if _FILE.fullmatch(name)]
+    return [(time, folder / name) for time, name in named if field_files.NAME.fullmatch(name)]
 
 
 def packed(entries: list[tuple[float, Path]],
