@@ -142,8 +142,8 @@ def fitted(law: Law, biomass: np.ndarray, relative: np.ndarray) -> Fit:
     if law.constants:
         from scipy.optimize import least_squares  # its import takes a quarter of a second
 
-        _, first, most = zip(*law.constants)
-        fit = least_squares(deviations, first, bounds=(0, most), x_scale="jac")
+        _, first, upper = zip(*law.constants)
+        fit = least_squares(deviations, first, bounds=(0, upper), x_scale="jac")
         values = fit.x
         _, sizes, directions = np.linalg.svd(fit.jac, full_matrices=False)
         sizes = np.maximum(sizes, np.finfo(float).eps)  # it is 0 where the rows leave one open

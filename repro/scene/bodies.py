@@ -58,20 +58,25 @@ def canonical(tables: dict, key: str) -> str:
     return ".".join([section, *below])
 
 
-def refuse_unaddressed(tables: dict, key: str, stated: str) -> None:
-    """Raise SceneError if a dotted key belongs to one of several bodies and does not say to which.
+def refuse_unaddressed(tables: dict, key: str, stated: str, known: Sequence[str]) -> None:
+    """Raise SceneError if a dotted key belongs to an aggregate that the scene does not have, or to
+    one of several and does not say to which.
 
-    stated: the entry in a message.
+    stated: the entry in a message; known: all dotted keys.
     """
     section, *below = key.split(".")
     bodies = tables.get(section)
-    if section == SECTION and below and isinstance(bodies, list) \
-            and place_of(bodies, below[0]) is None:
-        accepted = dotted_keys(_names(bodies))
-        keys = [part for part in below[1:] or below if not part.isdigit()]
-        example = ".".join([accepted[0], *keys])
+    if section != SECTION or not below or place_of(bodies, below[0]) is not None:
+        return
+    accepted = dotted_keys(_names(bodies))
+    keys = [part for part in below[1:] or below if not part.isdigit()]
+    example = ".".join([accepted[0], *keys])
+    if isinstance(bodies, list):
         raise SceneError(f"{stated}: the scene has {len(bodies)} aggregates, "
                          f"{', '.join(accepted)}; one of them is needed, such as {example}")
+    if isinstance(bodies, dict) and len(below) > 1 and f"{SECTION}.{below[0]}" not in known:
+        raise SceneError(f"{stated}: the scene has one aggregate, without this name; {example} is "
+                         "its key, and several aggregates are tables [[aggregate]]")
 
 
 def single(tables: dict) -> dict:

@@ -130,7 +130,7 @@ def leave_out(tables: dict, key: str, file: str, known: tuple[str, ...]) -> None
 
     One of several aggregates becomes None, so that the others keep their numbers.
     """
-    bodies.refuse_unaddressed(tables, key_of(key), f"{file}: --unset {quote(key)}")
+    bodies.refuse_unaddressed(tables, key_of(key), f"{file}: --unset {quote(key)}", known)
     *above, last = bodies.path_of(tables, key_of(key))
     table: Any = tables
     for part in above:
@@ -158,7 +158,7 @@ def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> Non
     if len(path) > MOST_PARTS:
         raise SceneError(f"{file}: --set {quote(entry)}: a key of at most {MOST_PARTS} parts "
                          "is needed")
-    bodies.refuse_unaddressed(tables, key_of(entry), f"{file}: --set {quote(entry)}")
+    bodies.refuse_unaddressed(tables, key_of(entry), f"{file}: --set {quote(entry)}", known)
     place = Place(file)
     path = bodies.path_of(tables, key_of(entry))
     for part, following in zip(path, path[1:]):

@@ -218,13 +218,7 @@ def sweep(scene: Source, vary: Sequence[str] = (), folder: str | Path | None = N
     """
     if folder is None:
         raise SceneError("--out: a folder is needed")
-    accepted = {f"workers {workers}: an integer, one or more, is needed":
-                workers is None or workers >= 1,
-                f"--seed {seed}: an integer, zero or more, is needed": seed >= 0,
-                f"clogged {clogged}: a number between 0 and 1 is needed": 0 < clogged < 1}
-    for message, holds in accepted.items():
-        if not holds:
-            raise SceneError(message)
+    refuse_values(workers, seed, clogged)
     swept = plan(scene, vary, folder, overrides, points, unset, samples, seed)
     with ready(scheduler, min(workers or pool.cores(), len(swept.points))) as run_points:
         for point in swept.points if scheduler is None else ():
@@ -247,6 +241,17 @@ def plan(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Over
     named = "run" if points is None else f"{own_points.origin(points)}: row"
     runs = design.points(scene, list(overrides), factors, combinations, unset, named)
     return Sweep(Path(folder), label(scene), factors, runs)
+
+
+def refuse_values(workers: int | None, seed: int, clogged: float) -> None:
+    """Raise SceneError for a value of an argument of :func:`sweep` that is out of range."""
+    accepted = {f"workers {workers}: an integer, one or more, is needed":
+                workers is None or workers >= 1,
+                f"--seed {seed}: an integer, zero or more, is needed": seed >= 0,
+                f"clogged {clogged}: a number between 0 and 1 is needed": 0 < clogged < 1}
+    for message, holds in accepted.items():
+        if not holds:
+            raise SceneError(message)
 
 
 def run_plan(plan: Sweep, run_points: pool.RunPoints, clogged: float = CLOGGED,

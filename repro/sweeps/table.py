@@ -16,7 +16,7 @@ import numpy as np
 
 from repro import results
 from repro.errors import OutputError
-from repro.results.files import atomic_path
+from repro.results.files import atomic_path, is_file
 from repro.results.quantities import Quantity, none_if_nan
 from repro.runs import status
 from repro.runs.integrity import read_scene_run
@@ -153,6 +153,15 @@ def read_runs(sweep: Sweep, statuses: dict[int, str], clogged: float) -> Runs:
     return Runs(_read_run(point, sweep.runs / point.name, statuses.get(point.index, "not run"),
                           clogged)
                 for point in sweep.points)
+
+
+def run_folders(folder: Path) -> list[Path]:
+    """The folders of the runs with rows of a sweep, by its ``runs.csv``; else the folder itself."""
+    file = folder / "runs.csv"
+    if not is_file(file):
+        return [folder]
+    with file.open(encoding="utf-8", newline="") as lines:
+        return [folder / row["folder"] for row in csv.DictReader(lines) if row["end_h"]]
 
 
 def _read_run(point: Point, folder: Path, missing_status: str, clogged: float) -> SweepRun:
