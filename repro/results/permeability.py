@@ -93,8 +93,8 @@ class Permeability:
     def to_csv(self, file: str | Path) -> None:
         """Write the columns to a CSV file. Raises OutputError if it cannot be written."""
         with output_path(Path(file)) as beside:
-            rows = zip(*(values.tolist() for values in self.columns.values()))
-            write_table(beside, list(self.columns), list(map(list, rows)))
+            write_table(beside, list(self.columns),
+                        zip(*(values.tolist() for values in self.columns.values())))
 
     def __str__(self) -> str:
         biomass = self.columns["biomass_per_pore_volume"]

@@ -751,7 +751,10 @@ def load_tables(source: Source, overrides: Collection[str] = (), unset: Sequence
     if isinstance(source, Scene):
         tables = scene_tables(source)
         if "numerics.preset" in map(key_of, overrides):
-            tables["numerics"] = _beside_preset(source.numerics)
+            of_preset = Numerics(source.numerics.preset, **PRESETS[source.numerics.preset])
+            tables["numerics"] = {  # another preset sets the other keys
+                key: value for key, value in write_table(source.numerics).items()
+                if getattr(source.numerics, key) != getattr(of_preset, key)}
     else:
         tables = deepcopy(source) if isinstance(source, dict) else read_tables(file)
     tables = bodies.single(tables)
@@ -829,13 +832,6 @@ def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
 
 def _within(key: str, section: str) -> bool:
     return f"{key}.".startswith(f"{section}.")
-
-
-def _beside_preset(numerics: Numerics) -> dict:
-    """Return the keys of [numerics] that differ from their preset; another preset sets the rest."""
-    of_preset = Numerics(numerics.preset, **PRESETS[numerics.preset])
-    return {key: value for key, value in write_table(numerics).items()
-            if getattr(numerics, key) != getattr(of_preset, key)}
 
 
 def _as_given(scene: Scene) -> Scene:

@@ -157,11 +157,6 @@ def _write_entry(entry: Field, value, units: Mapping[str, str] | None, key: str)
     return kind.write(value, units.get(key, kind.usual_unit))
 
 
-def toml(tables: dict, above: str = "") -> str:
-    """Format tables as a TOML file in ASCII, values before subtables."""
-    return _toml(tables, f"[{above[:-1]}]" if above else "", above)
-
-
 def toml_value(value: object) -> str:
     """Write a value as TOML in one line, in ASCII. Raises TypeError for one that TOML lacks."""
     value = plain(value)
@@ -189,7 +184,11 @@ def assignments(changes: dict) -> list[str]:
     return texts
 
 
-def _toml(tables: dict, head: str, above: str) -> str:
+def toml(tables: dict, head: str = "", above: str = "") -> str:
+    """Format tables as a TOML file in ASCII, values before subtables.
+
+    head: the line before them; above: their dotted key, with a dot at its end.
+    """
     lines = [head] if head else []
     inner = {key: value for key, value in tables.items() if isinstance(value, dict)
              or isinstance(value, list) and value and isinstance(value[0], dict)}
@@ -198,7 +197,7 @@ def _toml(tables: dict, head: str, above: str) -> str:
     for key, value in inner.items():
         name = f"{above}{key}"
         each, head = (value, f"[[{name}]]") if isinstance(value, list) else ([value], f"[{name}]")
-        parts += [_toml(table, head, f"{name}.") for table in each]
+        parts += [toml(table, head, f"{name}.") for table in each]
     return "\n\n".join(parts)
 
 

@@ -199,10 +199,10 @@ def write(sweep: Sweep, runs: list[SweepRun]) -> None:
     varied = [factor.column for factor in sweep.factors]
     with atomic_path(sweep.folder / "table.csv") as beside:
         results.write_table(beside, ["run", *varied, *series_columns(sweep.points)],
-                            list(_rows(sweep, runs)))
+                            _rows(sweep, runs))
     columns = run_columns(sweep.factors, runs)
     with atomic_path(sweep.folder / "runs.csv") as beside:
-        results.write_table(beside, list(columns), list(map(list, zip(*columns.values()))))
+        results.write_table(beside, list(columns), zip(*columns.values()))
 
 
 def run_columns(factors: Sequence[Factor], runs: Sequence[SweepRun]) -> dict[str, list]:

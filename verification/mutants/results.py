@@ -205,7 +205,7 @@ MUTANTS = (
         ("missing-row-counted-again",
          "A run that resumes within a step lists a missing row of this step twice.",
          "Recorder.add",
-         "state.missing and state.missing not in self.history.missing",
+         "state.missing and state.missing not in history.missing",
          "state.missing",
          "tests/test_warned.py::test_a_row_that_is_left_out_is_reported")),
     *changes(
@@ -479,8 +479,8 @@ MUTANTS = (
         ("name-of-the-preset-alone",
          "Another preset of a loaded scene changes the name of the preset alone.",
          "load_tables",
-         'tables["numerics"] = _beside_preset(source.numerics)',
-         "pass",
+         '"numerics.preset" in map(key_of, overrides)',
+         "False",
          "tests/test_presets.py::test_another_preset_of_a_loaded_scene_sets_all_its_keys[fast-accurate]")),
     *changes(
         "repro/scene/units.py",
@@ -568,10 +568,9 @@ MUTANTS = (
         "repro/preflight/resolved.py",
         ("no-report-between-the-meshes-of-a-check",
          "A check reports nothing between the mesh of a head loss and its flow.",
-         "_head_loss",
-         "poll()\n"
-         "return solving.Solver.of(scene).solve_flow(space, drive).head_loss",
-         "return solving.Solver.of(scene).solve_flow(space, drive).head_loss",
+         "find_unresolved_flow",
+         "space = seeded(finer).space\npoll()",
+         "space = seeded(finer).space",
          "tests/test_progress.py::test_a_check_reports_between_its_stages_without_its_thread")),
     *changes(
         "repro/model/gear.py",
@@ -816,7 +815,7 @@ MUTANTS = (
         "repro/runs/folder.py",
         ("ended-process-locks",
          "Without flock the lock of a process that has ended counts as a file of the user.",
-         "_refuse_another_lock",
+         "locked",
          "is_file(path) and (path.stat().st_size == 0 or SoftFileLock(path).pid is not None)",
          "is_file(path) and path.stat().st_size == 0",
          "tests/test_names.py::test_a_killed_run_without_flock_goes_on[how0]"),
@@ -885,7 +884,7 @@ MUTANTS = (
          "tests/test_resume.py::test_a_resume_under_other_conditions_is_reported[blas]"),
         ("page-never-made-again",
          "A finished run without a page gets none.",
-         "_complete_finished_run",
+         "_continue",
          'has_checkpoint or REPORT not in record["sha256"] or not is_file(folder / REPORT)',
          "has_checkpoint",
          "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line[100000-report.html: ]")),
@@ -976,7 +975,7 @@ MUTANTS = (
         ("any-file-is-shown",
          "A page reads any file that the index names.",
          "listed_files",
-         "[(time, folder / name) for time, name in named if _FILE.fullmatch(name)]",
+         "[(time, folder / name) for time, name in named if field_files.NAME.fullmatch(name)]",
          "[(time, folder / name) for time, name in named]",
          "tests/test_report.py::test_fields_are_read_from_the_runs_own_files_alone"),
         ("page-of-the-first-mesh",
@@ -1020,13 +1019,15 @@ MUTANTS = (
          'remaining = 0.0 if True else needed(scene.growth, "growth").end - covered',
          f"{CHECK}steps_are_expected_from_those_of_the_coarse_run")),
     *changes(
-        "repro/preflight/outlook.py",
+        "repro/polling.py",
         ("look-without-end",
          "A look has no end.",
-         "CoarseRun._stop.check",
-         "perf_counter() > deadline",
+         "within",
+         "clock() > deadline",
          "False",
-         f"{CHECK}a_look_ends_within_a_step"),
+         f"{CHECK}a_look_ends_within_a_step")),
+    *changes(
+        "repro/preflight/outlook.py",
         ("contact-at-the-end",
          "The outlook has the end of the run as the time of contact.",
          "CoarseRun._run",
@@ -1041,7 +1042,7 @@ MUTANTS = (
          f"{CHECK}the_coarse_run_keeps_the_physics_of_the_scene"),
         ("sketch-that-fails-unsaid",
          "A coarse run that fails refuses the scene.",
-         "CoarseRun._stop",
+         "CoarseRun.run",
          "(SimulationError, StageError, ArithmeticError)",
          "ZeroDivisionError",
          f"{CHECK}a_coarse_run_that_fails_is_no_refusal")),
@@ -1550,34 +1551,26 @@ MUTANTS = (
         ("sweep-ignores-seed",
          "The command ignores --seed.",
          "call",
-         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
-         "      unset=options.unset,\n"
-         "      samples=options.samples, seed=options.seed, workers=options.workers,\n"
-         "      scheduler=options.scheduler, clogged=options.clogged,\n"
-         "      progress=on_terminal and not options.quiet,\n"
-         "      tell=None if on_terminal or options.quiet else _print_run)",
-         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
-         "      unset=options.unset,\n"
-         "      samples=options.samples, workers=options.workers,\n"
-         "      scheduler=options.scheduler, clogged=options.clogged,\n"
-         "      progress=on_terminal and not options.quiet,\n"
-         "      tell=None if on_terminal or options.quiet else _print_run)",
+         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
+         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
+         "scheduler=options.scheduler, clogged=options.clogged, progress=on_terminal and not options.quiet, "
+         "tell=None if on_terminal or options.quiet else _print_run)",
+         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
+         "unset=options.unset, samples=options.samples, workers=options.workers, scheduler=options.scheduler, "
+         "clogged=options.clogged, progress=on_terminal and not options.quiet, tell=None if on_terminal or "
+         "options.quiet else _print_run)",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect"),
         ("sweep-ignores-clogged",
          "The command ignores --clogged.",
          "call",
-         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
-         "      unset=options.unset,\n"
-         "      samples=options.samples, seed=options.seed, workers=options.workers,\n"
-         "      scheduler=options.scheduler, clogged=options.clogged,\n"
-         "      progress=on_terminal and not options.quiet,\n"
-         "      tell=None if on_terminal or options.quiet else _print_run)",
-         "sweep(options.scene, options.vary, options.out, options.set, points=options.points,\n"
-         "      unset=options.unset,\n"
-         "      samples=options.samples, seed=options.seed, workers=options.workers,\n"
-         "      scheduler=options.scheduler,\n"
-         "      progress=on_terminal and not options.quiet,\n"
-         "      tell=None if on_terminal or options.quiet else _print_run)",
+         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
+         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
+         "scheduler=options.scheduler, clogged=options.clogged, progress=on_terminal and not options.quiet, "
+         "tell=None if on_terminal or options.quiet else _print_run)",
+         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
+         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
+         "scheduler=options.scheduler, progress=on_terminal and not options.quiet, tell=None if on_terminal "
+         "or options.quiet else _print_run)",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect")),
     *changes(
         "repro/sweeps/driver.py",
@@ -2049,7 +2042,7 @@ MUTANTS = (
          "tests/test_check.py::test_check_describes_values_over_time"),
         ("every-step-said",
          "check reports the last of the rows' times as their distance.",
-         "_every_step",
+         "_output",
          'f", and every {rows[0]:g} h"',
          'f", and every {rows[-1]:g} h"',
          "tests/test_check.py::test_check_describes_values_over_time"),
@@ -2083,9 +2076,9 @@ MUTANTS = (
          "tests/test_check.py::test_check_prints_a_report_and_exits_with_zero"),
         ("memory-said",
          "check reports seconds as MB.",
-         "_cost",
-         'f"{estimate.memory:.0f} MB in addition to the program"',
-         'f"{estimate.seconds:.0f} MB in addition to the program"',
+         "report",
+         'f"{cost.memory:.0f} MB in addition to the program"',
+         'f"{cost.seconds:.0f} MB in addition to the program"',
          "tests/test_check.py::test_the_duration_of_a_run_has_a_suitable_unit[45.3-45 s]")),
     *changes(
         "repro/preflight/simplifications.py",
@@ -2509,7 +2502,7 @@ MUTANTS = (
         ("iterations-of-the-last-row",
          "run.json counts only the Newton iterations of the last row.",
          "Recorder.add",
-         "sum_counts(self.history.iterations, reported.iterations)",
+         "sum_counts(history.iterations, reported.iterations)",
          "reported.iterations",
          f"{GUARDS}counts_in_the_record_include_every_step")),
     *changes(
