@@ -152,15 +152,8 @@ def report(checked: SceneCheck) -> str:
                                subsequent_indent=" " * 14)
     nodes = f"about {checked.nodes}" if checked.estimated else f"{checked.nodes}"
     lines += ["", f"Mesh at t = 0: {nodes} nodes, {checked.triangles} triangles", ""]
-    cost, outlook = checked.cost, checked.outlook
-    memory = f"{cost.memory:.0f} MB in addition to the program"
-    if cost.steps is None:
-        lines += [f"Cost, roughly: {memory}"]
-    else:
-        steps = f"{cost.steps} steps" if cost.steps else "no step"
-        lines += [f"Cost, roughly: {duration(cost.seconds)} ({steps}) without writing files; "
-                  f"{memory}",
-                  "  The estimate is right within a factor of three in the paper's pores."]
+    outlook = checked.outlook
+    lines += _cost(checked.cost)
     if outlook:
         heading = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
         reason = outlook.stopped or "the end of the run"
@@ -175,6 +168,17 @@ def report(checked: SceneCheck) -> str:
         lines += textwrap.wrap(f"WARNING {caveat.key}: {caveat.text}.", WIDTH + 2,
                                subsequent_indent="  ")
     return "\n".join(lines)
+
+
+def _cost(estimate: Cost) -> Iterator[str]:
+    memory = f"{estimate.memory:.0f} MB in addition to the program"
+    if estimate.steps is None:
+        yield f"Cost, roughly: {memory}"
+        return
+    steps = f"{estimate.steps} steps" if estimate.steps else "no step"
+    yield (f"Cost, roughly: {duration(estimate.seconds)} ({steps}) without writing files; "
+           f"{memory}")
+    yield "  The estimate is right within a factor of three in the paper's pores."
 
 
 def duration(value: float) -> str:

@@ -2076,9 +2076,9 @@ MUTANTS = (
          "tests/test_check.py::test_check_prints_a_report_and_exits_with_zero"),
         ("memory-said",
          "check reports seconds as MB.",
-         "report",
-         'f"{cost.memory:.0f} MB in addition to the program"',
-         'f"{cost.seconds:.0f} MB in addition to the program"',
+         "_cost",
+         'f"{estimate.memory:.0f} MB in addition to the program"',
+         'f"{estimate.seconds:.0f} MB in addition to the program"',
          "tests/test_check.py::test_the_duration_of_a_run_has_a_suitable_unit[45.3-45 s]")),
     *changes(
         "repro/preflight/simplifications.py",
