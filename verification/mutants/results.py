@@ -2572,7 +2572,7 @@ MUTANTS = (
          "Conductivity is relative to the largest value instead of the first.",
          "SweepRun.relative",
          "conductivity[:1]",
-         "conductivity.max()",
+         "conductivity.max(initial=0.0)",
          "tests/test_sweep.py::test_biomass_and_contact_are_read_from_the_rows"),
         ("clogged-of-the-most",
          "A pore clogs at a part of its largest conductivity instead of its first.",
