@@ -18,6 +18,23 @@ def poll() -> None:
         check()
 
 
+class OutOfTime(Exception):
+    """The time of :func:`within` is over."""
+
+
+@contextmanager
+def within(seconds: float, clock: Callable[[], float]) -> Iterator[None]:
+    """Raise OutOfTime at the first poll after some seconds of a clock."""
+    deadline = clock() + seconds
+
+    def check() -> None:
+        if clock() > deadline:
+            raise OutOfTime
+
+    with polling(check):
+        yield
+
+
 @contextmanager
 def polling(check: Callable[[], None]) -> Iterator[None]:
     """Make a check active within a context.

@@ -45,7 +45,7 @@ FOLLOWED = {
                    "try a smaller numerics.refinement": MEMORY},
     "cli/sweep.py": {"continues the sweep": SIGNALS},
     "fem/linear.py": {"pip install": PACKAGES},
-    "scene/drawn.py": {"pip install": PACKAGES},
+    "scene/needed.py": {"pip install": PACKAGES},
     "scene/former.py": {"leave it out": "tests/test_former.py::test_the_advice_is_accepted"},
     "march/folding.py": {'growth.new_biomass = "stress_free" does': STRESS_FREE},
     "march/state.py": {"try a smaller numerics.refinement": MEMORY},
@@ -78,8 +78,6 @@ FOLLOWED = {
         "models it": DRAWN, "refine by themselves": THRESHOLDS, "replace F by": THRESHOLDS,
         "adds the forces": THRESHOLDS, "computes the traction": DRAWN, "choose a shorter one": THRESHOLDS,
         '"stress_free" avoids this': STRESS_FREE},
-    "results/drawing.py": {"pip install": PACKAGES},
-    "results/tables.py": {"pip install": PACKAGES},
     "runs/execution.py": {
         "--resume makes a run longer": LONGER, "give a later one": LONGER, "run another scene": FOLDERS,
         "give a new folder": FOLDERS, "with --force": "tests/test_resume.py::test_only_force_repeats_a_damaged_run",
@@ -98,7 +96,6 @@ FOLLOWED = {
     "scene/text.py": {"remove it to set the key":
                       "tests/test_scene_text.py::test_every_key_may_be_made_active_at_once"},
     "scene/units.py": {"give milligrams": ENTRIES, "give mg/L": ENTRIES},
-    "sweeps/cluster.py": {"pip install": PACKAGES},
     "sweeps/design.py": {"leave :{} out":
                          "tests/test_sweep_design.py::test_each_stratum_of_each_range_has_one_value"},
     "sweeps/folder.py": {"so not of this sweep; move it away": SWEEPS, "not of a run; move it away": SWEEPS,

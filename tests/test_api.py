@@ -14,7 +14,7 @@ import repro
 from repro import results
 from repro.cli import main
 from repro.errors import OutputError
-from repro.results import picture
+from repro.results import drawing
 from repro.results.tables import END_TIMES, Results, solve
 from repro.scene import SceneError, load_scene
 from tests import faults
@@ -183,8 +183,8 @@ def test_a_notebook_shows_key_figures_and_a_picture(solved):
     """The picture is a PNG of the meshed part, in which the aggregate's boundary is red. pyplot keeps no figure."""
     before = plt.get_fignums()
     html = solved._repr_html_()
-    summary = "conductivity of the pore 174.1 → 173.8 m/day; thickness of the aggregate 5 → 5.295 um"
-    assert summary in html and "at t = 0.6 h" in html and len(html) < 100_000
+    assert "conductivity of the pore 174.1 → 173.8 m/day; area of the aggregate 39.27 → " in html
+    assert "; thickness of the aggregate 5 → 5.295 um" in html and "at t = 0.6 h" in html and len(html) < 100_000
     data = base64.b64decode(re.search(r'src="data:image/png;base64,([^"]+)"', html)[1])
     pixels = (255 * plt.imread(io.BytesIO(data))[..., :3]).round().astype(int)
     rows, columns = np.nonzero((np.abs(pixels - [215, 25, 28]) < 40).all(axis=2))  # the colour of the boundary
@@ -212,9 +212,9 @@ def test_help_begins_with_use_and_the_version_is_printed(capsys):
 
 def test_a_picture_states_which_values_are_dark():
     coordinates = np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 3.0)])
-    drawing = {"places_um": coordinates, "triangles": np.array([[0, 1, 2]]), "region": np.zeros(1)}
-    caption = picture.figure(drawing | {"acceptor_mg_per_L": np.array([3.0, 1.5, 7.0])}, "base", 2.5)
+    fields = {"places_um": coordinates, "triangles": np.array([[0, 1, 2]]), "region": np.zeros(1)}
+    caption = drawing.figure(fields | {"acceptor_mg_per_L": np.array([3.0, 1.5, 7.0])}, "base", 2.5)
     assert caption.count("acceptor (mg/L), 1.5 (dark) to 7 (light), at t = 2.5 h") == 2
     speeds = np.array([[-3.0, 4, 0], [0, 1, 0], [0, 2, 0]])
-    caption = picture.figure(drawing | {"velocity_m_per_d": speeds}, "base", 2.5)
+    caption = drawing.figure(fields | {"velocity_m_per_d": speeds}, "base", 2.5)
     assert "velocity (m/day), 1 (dark) to 5 (light)" in caption

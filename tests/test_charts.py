@@ -144,7 +144,7 @@ def test_means_over_steps_are_drawn_as_steps(name, make):
     """A pulse in a short step has its own height and length, in each chart of a ledger on both pages."""
     kind = next(kind for kind in quantities.KINDS if name in kind.drawn)
     drawings = [chart for chart in make(pulsed(7, 3)) if chart.title.startswith(kind.title)]
-    label = quantities.KNOWN[name].label
+    label = quantities._named(name).label
     (line,) = [line for chart in drawings for line in chart.lines
                if label in (line.label, chart.title.rpartition(": ")[2])]
     assert line.times.tolist() == [0, 10, 10, 10.5, 10.5, 20.5, 20.5, 21, 21, 31, 31, 31.5, 31.5, 41.5]

@@ -206,7 +206,7 @@ def test_the_run_of_a_scene_gives_shapes():
                               "numerics": {"preset": "fast"}})
     pores = list(own._grown(scene, lambda time, end: None))
     shares = np.array([pore.boundary.area for pore in pores]) / 3600
-    assert len(shares) >= 3 and (shares[1:] > own.APART * shares[:-1]).all()
+    assert len(shares) >= 3 and (shares[1:] > own.STEP * shares[:-1]).all()
     lengths = np.array([own.added_length(pore.space, LAMBDA) for pore in pores])
     assert lengths == pytest.approx(resistance.resistance(shares, 1.0, None, LAMBDA).length, rel=0.2)
 

@@ -50,7 +50,7 @@ def test_a_list_of_one_table_is_this_table():
     assert one == scene_of(LEFT) == parse_scene({**TABLES, "aggregate": LEFT}, "mine", "mine.toml")
     assert scene_hash(one) == scene_hash(load_scene({**TABLES, "aggregate": (LEFT,)}))
     assert isinstance(scene_tables(one)["aggregate"], dict) and one.units["aggregate.radius"] == "um"
-    assert one.aggregates == (one.aggregate,) and one.places == ["aggregate"]
+    assert one.aggregates == (one.aggregate,) and one.aggregate_keys == ["aggregate"]
     assert load_scene(one, ["aggregate.left.radius=3 um"]) == load_scene(one, ["aggregate.1.radius=3 um"]) \
         == load_scene(one, ["aggregate.radius=3 um"])
     clean = load_scene(one, unset=["aggregate", "kinetics", "growth", "output"])
@@ -59,7 +59,7 @@ def test_a_list_of_one_table_is_this_table():
 
 def test_several_aggregates_are_read_back_and_count_in_the_hash(tmp_path):
     scene = scene_of()
-    assert scene.labels == ["left", "2"] and scene.places == ["aggregate.left", "aggregate.2"]
+    assert scene.labels == ["left", "2"] and scene.aggregate_keys == ["aggregate.left", "aggregate.2"]
     assert [seed.wall for seed in scene.aggregates] == ["lower", "upper"]
     with pytest.raises(ValueError, match="the scene has 2 aggregates"):
         _ = scene.aggregate
@@ -163,7 +163,7 @@ def test_bodies_keep_the_least_film(one, other, gap):
     def nearer(by):
         return {**other, "position": f"{float(other.get('position', '0 um').split()[0]) - by!r} um"}
 
-    assert load_scene(tables(other, 0.999 * gap)).places == ["aggregate.a", "aggregate.2"]
+    assert load_scene(tables(other, 0.999 * gap)).aggregate_keys == ["aggregate.a", "aggregate.2"]
     message = refusal(tables(other, 1.001 * gap))
     assert f"aggregate.a and aggregate.2 are {gap:.3g} um apart; growth.minimum_film" in message
     if gap == 1.5 and "wall" not in other:
@@ -360,8 +360,6 @@ def test_names_of_columns_of_bodies_tell_quantity_unit_and_body():
             assert name not in known and found.words == f"{quantity.words}, aggregate {label}"
             assert names.unit(name) == quantity.unit.symbol and names.label(name).endswith(f", {label}")
     assert names.known("aggregate__area_um2") is None and names.known("aggregate_area_um2").name in known
-
-
 
 
 @pytest.mark.thorough

@@ -10,7 +10,6 @@ import subprocess
 import sys
 from concurrent.futures import CancelledError
 from contextlib import closing, contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -482,8 +481,9 @@ def test_a_sweep_converts_to_tables_and_pictures(tmp_path, monkeypatch):
 
 def test_events_of_a_run():
     """Half of the conductivity is reached between rows; a fold has the time of the last row."""
-    folded = table.RunSeries(np.array([0.0, 1.0, 2.0]), np.array([1.0, 0.8, 0.2]), np.zeros(3), np.zeros(3, bool), 1.0,
-                             0.1, folded=True)
+    series = {"time_h": np.array([0.0, 1.0, 2.0]), "conductivity_m_per_d": np.array([1.0, 0.8, 0.2]),
+              "aggregate_area_um2": np.zeros(3), "contact": np.zeros(3)}
+    folded = table.SweepRun(two_points()[0], ENDS[2], 0.1, series, 1.0)
     value = {number.name: number.reported(folded) for number in table.NUMBERS}
     assert value["half_conductivity_time_h"] == pytest.approx(1 + np.log(1.6) / np.log(4))
     assert value["fold_time_h"] == 2 and np.isnan(value["contact_time_h"]) and np.isnan(value["clogging_time_h"])
@@ -494,9 +494,11 @@ def test_marks_of_the_page_have_the_colour_of_their_key(tmp_path):
     that ended before; failed runs have no mark. Lines go up with their values, and stay in the frame."""
     varied = "pore.width=40 um, 50 um", "flow.viscosity_ratio=100, 400, 1000"
     designed, course = make_points(*varied, source="flow_only"), np.array([1.0, 8.0])
-    numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, None)]
-    runs = [table.SweepRun(one, "completed", course, course, course, each) for one, each in zip(designed, numbers_of)]
-    runs[5] = replace(runs[5], status="failed: x")
+    series = dict.fromkeys(("time_h", "conductivity_m_per_d", "aggregate_area_um2"), course)
+    statuses = ["completed"] * 5 + ["failed: x"]
+    runs = [table.SweepRun(one, status, 0.3, series) for one, status in zip(designed, statuses)]
+    for run, time in zip(runs, (5.0, 5.0, None, 5.0, 5.0, None)):
+        run.numbers["clogging_time_h"] = time
     text = page.page(Sweep(tmp_path, "flow_only", [*map(parse, varied)], designed), runs, 0.3)
     times = text.split("<h2>Clogging time")[1].split("<h2>")[0]
     figures = re.findall("<figure>.*?</figure>", times, re.S)

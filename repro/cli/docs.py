@@ -32,13 +32,8 @@ def call(options) -> int:
             say(f"{name:14}{subject}")
     else:
         page = files("repro") / "pages" / f"{options.page}.md"
-        say(_as_text(page.read_text(encoding="utf-8").removesuffix("\n")))
+        # a file of the repository in place of a link to it, and formulas without TeX's signs
+        text = re.sub(r"\[([^]]+)\]\((?!https?:)([^)]+)\)", r"\1 (docs/\2 in the repository)",
+                      page.read_text(encoding="utf-8").removesuffix("\n"))
+        say(re.sub(r"\$|\\(?:quad)?", "", text))
     return 0
-
-
-def _as_text(markdown: str) -> str:
-    """The text for a terminal: files of the repository in place of links to them, and formulas
-    without TeX's signs."""
-    text = re.sub(r"\[([^]]+)\]\((?!https?:)([^)]+)\)", r"\1 (docs/\2 in the repository)",
-                  markdown)
-    return re.sub(r"\$|\\(?:quad)?", "", text)

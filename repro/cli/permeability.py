@@ -23,10 +23,10 @@ def call(options) -> int:
     """Print the laws, and write the table."""
     from repro.results.permeability import of_runs
     from repro.runs.scripts import load_run
+    from repro.sweeps.table import run_folders
 
-    folders = sorted(options.folder.glob("runs/*")) or [options.folder]
     try:
-        permeability = of_runs([load_run(folder) for folder in folders])
+        permeability = of_runs(list(map(load_run, run_folders(options.folder))))
     except (KeyError, ValueError) as error:
         raise OutputError(f"{options.folder}: {error.args[0]}") from error
     say(str(permeability))

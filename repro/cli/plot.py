@@ -5,9 +5,7 @@ Without a quantity and a file, list what can be drawn.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 from repro.cli.arguments import path
 from repro.errors import OutputError, printable
@@ -75,18 +73,13 @@ def call(options) -> int:
             draw = partial(results.plot, options.field, image=options.image, corner=options.corner,
                            time=times[0] if times and len(times) == 1 else times,
                            um_per_pixel=options.um_per_pixel, **style)
-            _save(draw, options.out)
+            from repro.results.files import output_path
+
+            with output_path(options.out) as beside:
+                axes = draw()
+                figure = (axes[0] if isinstance(axes, list) else axes).figure
+                figure.savefig(beside, dpi=150)
     except (ImportError, KeyError, TypeError, ValueError) as error:
         raise OutputError(str(error.args[0])) from error
     say(printable(f"{options.folder}: drawn in {options.out}"))
     return 0
-
-
-def _save(draw: Callable, out: Path) -> None:
-    """Draw one or several axes, and save their figure."""
-    from repro.results.files import output_path
-
-    with output_path(out) as beside:
-        axes = draw()
-        figure = (axes[0] if isinstance(axes, list) else axes).figure
-        figure.savefig(beside, dpi=150)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path, seconds
@@ -65,20 +64,17 @@ def call(options) -> int:
     if not options.resume and not (options.scene and options.out):
         options.refuse("give SCENE and --out DIR, or --resume DIR")
     with interrupts.catch_signals() as stop:  # before NumPy starts threads that it would miss
-        _load_and_run(options, stop)
+        scene = None if options.resume else load_scene(options.scene, options.set,
+                                                       unset=options.unset)
+        from repro.runs.execution import Watch
+
+        with progress.display_events(options.quiet, options.json) as tell:
+            try:
+                _run(options, scene, Watch(tell, options.checkpoint, stop, stop))
+            except MemoryError as error:  # not within a step, which reports its own
+                raise SimulationError(f"out of memory ({error}); try a smaller "
+                                      "numerics.refinement") from error
     return 0
-
-
-def _load_and_run(options, stop: Callable[[], int]) -> None:
-    scene = None if options.resume else load_scene(options.scene, options.set, unset=options.unset)
-    from repro.runs.execution import Watch
-
-    with progress.display_events(options.quiet, options.json) as tell:
-        try:
-            _run(options, scene, Watch(tell, options.checkpoint, stop, stop))
-        except MemoryError as error:  # not within a step, which reports its own
-            raise SimulationError(f"out of memory ({error}); try a smaller "
-                                  "numerics.refinement") from error
 
 
 def _run(options, scene: Scene | None, watch: Watch) -> None:

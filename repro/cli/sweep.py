@@ -5,7 +5,6 @@ The tables and a page of all runs are written to the same folder.
 
 from __future__ import annotations
 
-import argparse
 import signal
 import sys
 from collections.abc import Iterator
@@ -19,6 +18,9 @@ from repro.runs.progress import say
 
 if TYPE_CHECKING:
     from repro.sweeps.driver import Swept
+
+if TYPE_CHECKING:
+    pass
 
 #: Exit status if some runs have failed.
 SOME_FAILED = 3
@@ -47,15 +49,15 @@ def add(commands) -> None:
                          "as pore.width (um)")
     command.add_argument("--samples", metavar="N", type=int,
                          help="draw N runs from a Latin hypercube instead of a grid")
-    command.add_argument("--seed", metavar="S", type=_natural_number, default=0,
+    command.add_argument("--seed", metavar="S", type=int, default=0,
                          help="seed of the Latin hypercube (default: 0)")
     command.add_argument("--out", metavar="DIR", type=path,
                          help="folder for the runs, their tables and their page")
-    command.add_argument("--workers", metavar="N", type=_positive_number,
+    command.add_argument("--workers", metavar="N", type=int,
                          help="number of parallel runs (default: one per core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT",
                          help="address of a Dask scheduler whose workers make the runs")
-    command.add_argument("--clogged", metavar="PART", type=_fraction, default=0.1,
+    command.add_argument("--clogged", metavar="PART", type=float, default=0.1,
                          help="fraction of the first conductivity at which a pore counts as "
                          "clogged (default: 0.1)")
     command.add_argument("--dry-run", action="store_true",
@@ -65,50 +67,28 @@ def add(commands) -> None:
     command.set_defaults(call=call)
 
 
-def _natural_number(text: str) -> int:
-    if int(text) < 0:
-        raise argparse.ArgumentTypeError("an integer, zero or more, is needed")
-    return int(text)
-
-
-def _positive_number(text: str) -> int:
-    if int(text) < 1:
-        raise argparse.ArgumentTypeError("an integer, one or more, is needed")
-    return int(text)
-
-
-def _fraction(text: str) -> float:
-    if not 0 < float(text) < 1:
-        raise argparse.ArgumentTypeError("a number between 0 and 1 is needed")
-    return float(text)
-
-
 def call(options) -> int:
-    """Make the sweep."""
-    from repro.sweeps.driver import sweep
+    """Make the sweep, or print its expected cost; return the exit status."""
+    from repro.sweeps import driver
 
+    driver.refuse_values(options.workers, options.seed, options.clogged)
     if options.dry_run:
-        return _dry_run(options)
+        from repro.sweeps import expected, pool
+
+        plan = driver.plan(options.scene, options.vary, options.out or "", options.set,
+                           options.points, options.unset, options.samples, options.seed)
+        workers = min(options.workers or pool.cores(), len(plan.points))
+        say(printable(expected.describe(plan, workers)))
+        return 0
     on_terminal = sys.stderr.isatty()
     with _end_on_signals(options.command_line):
-        swept = sweep(options.scene, options.vary, options.out, options.set,
-                      points=options.points, unset=options.unset,
-                      samples=options.samples, seed=options.seed, workers=options.workers,
-                      scheduler=options.scheduler, clogged=options.clogged,
-                      progress=on_terminal and not options.quiet,
-                      tell=None if on_terminal or options.quiet else _print_run)
+        swept = driver.sweep(options.scene, options.vary, options.out, options.set,
+                             points=options.points, unset=options.unset,
+                             samples=options.samples, seed=options.seed, workers=options.workers,
+                             scheduler=options.scheduler, clogged=options.clogged,
+                             progress=on_terminal and not options.quiet,
+                             tell=None if on_terminal or options.quiet else _print_run)
     return _report(swept)
-
-
-def _dry_run(options) -> int:
-    """Print the expected cost of the sweep."""
-    from repro.sweeps import driver, expected, pool
-
-    plan = driver.plan(options.scene, options.vary, options.out or "", options.set, options.points,
-                       options.unset, options.samples, options.seed)
-    workers = min(options.workers or pool.cores(), len(plan.points))
-    say(printable(expected.describe(plan, workers)))
-    return 0
 
 
 @contextmanager

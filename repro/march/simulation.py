@@ -127,7 +127,7 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
     tables = scene_tables(scene)
     if len(scene.aggregates) > 1:
         raise SceneError(f"{scene.name} with a shape: one aggregate at most is needed, and the "
-                         f"scene has {', '.join(scene.places)}")
+                         f"scene has {', '.join(scene.aggregate_keys)}")
     seed = dict(tables.get("aggregate", {}))
     for key in ("radius", "position"):
         seed.pop(key, None)

@@ -53,7 +53,7 @@ THICKNESSES, WIDTHS = (0.05, 0.98), (0.5, 2.0)
 SLOWEST, LEAST_SUPPLY = 1e-4, 0.01
 #: Length of pores over W, as of the shapes of the law of resistance; factor between the areas of
 #: grown shapes; their largest A / W^2, that of its table.
-LENGTH, APART, LARGEST = 15.0, 1.2, 4.5
+LENGTH, STEP, LARGEST = 15.0, 1.2, 4.5
 #: Largest change of the fit's unknowns, ln of factors and exponents, and most evaluations: few
 #: states may leave a constant undetermined. With twice the change, or with 20 to 200 evaluations,
 #: the bound of a scene changes by less than 0.3 %.
@@ -201,7 +201,7 @@ def _grown(scene: Scene, show: Callable) -> Iterator[Pore]:
             area = report.pore.boundary.area / scene.pore.width**2
             if area > LARGEST:
                 return
-            if area > APART * share:
+            if area > STEP * share:
                 share = area
                 yield report.pore
 
@@ -305,5 +305,5 @@ def fit(aggregates: Throats, solutions: np.ndarray, start: Transport) -> Transpo
 
 def bound(aggregates: Throats, solutions: np.ndarray) -> float:
     """Return the least bound, to three digits, for the uptakes (2, n) of the fit."""
-    apart = np.expm1(np.abs(deviations(aggregates, solutions))).max(axis=0)
-    return float(f"{FACTOR * (apart / aggregates.spread()).max():.3g}")
+    errors = np.expm1(np.abs(deviations(aggregates, solutions))).max(axis=0)
+    return float(f"{FACTOR * (errors / aggregates.spread()).max():.3g}")

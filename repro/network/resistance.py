@@ -69,16 +69,27 @@ def resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | None, rat
     touches = is_plug(share) if spanned is None else np.asarray(spanned, bool)
     share, width, touches = np.broadcast_arrays(share, width, touches)
     check = Check("added_resistance", outside)
-    is_known = check.positive("width", width) & (
-        check.within(SHARE, share, 0.0, share_range(True)[1]) if spanned is None
-        else _within_kind(check, share, touches))
+    is_known = check.positive("width", width)
+    (_, before), (_, after) = map(share_range, (False, True))
+    if spanned is None:
+        is_known = is_known & check.within(SHARE, share, 0.0, after)
+    else:
+        is_known = (is_known
+                    & check.within(f"{SHARE} before contact (spanned=False)", share, 0.0, before,
+                                   ~touches)
+                    & check.within(f"{SHARE} of a plug (spanned=True)", share, CONTACT[0], after,
+                                   touches))
     is_known &= check.within(SHARE, share, 0.0, largest)
     results = np.full((3, *share.shape), np.nan)
     for kind in (False, True):
         selected = is_known & (touches == kind)
         results[:, selected] = _law(kind, share[selected], ratio)
-    if spanned is None:
-        _include_both_kinds(results, share, ratio)
+    if spanned is None:  # the area does not determine the kind everywhere
+        either = (share >= CONTACT[0]) & (share <= CONTACT[1])
+        kinds = [_law(kind, np.minimum(share[either], most), ratio)
+                 for kind, most in ((False, before), (True, after))]
+        results[1, either] = np.min(kinds, axis=0)[1]
+        results[2, either] = np.max(kinds, axis=0)[2]
     if shapes is not None:
         factor = _of_shapes(shapes, touches, share, ratio)
         results *= np.stack([factor, np.minimum(factor, 1.0), np.maximum(factor, 1.0)])
@@ -110,27 +121,13 @@ def is_plug(share: np.ndarray) -> np.ndarray:
     return share > share_range(False)[1]
 
 
-def _within_kind(check: Check, share: np.ndarray, touches: np.ndarray) -> np.ndarray:
-    """Return where A / W^2 is in the range of aggregates of the given kind."""
-    return (check.within(f"{SHARE} before contact (spanned=False)", share, 0.0,
-                         share_range(False)[1], ~touches)
-            & check.within(f"{SHARE} of a plug (spanned=True)", share, CONTACT[0],
-                           share_range(True)[1], touches))
-
-
-def _include_both_kinds(results: np.ndarray, share: np.ndarray, ratio: float) -> None:
-    """Widen the bounds of the (3, ...) results where the area does not determine the kind."""
-    either = (share >= CONTACT[0]) & (share <= CONTACT[1])
-    kinds = [_law(kind, np.minimum(share[either], share_range(kind)[1]), ratio)
-             for kind in (False, True)]
-    results[1, either] = np.min(kinds, axis=0)[1]
-    results[2, either] = np.max(kinds, axis=0)[2]
-
-
 def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
     """Interpolate (3, n) r and its bounds at A / W^2 (n,) for one kind of aggregate.
 
     Logarithms are interpolated: those of r by monotone cubics, those of its bounds over r linearly.
+    Below the first area of the table, half-discs are in a shear flow, where r is proportional to
+    the area; its profile is a parabola, which reduces r / A in proportion to the thickness. Plugs
+    with less area have just touched both walls.
     """
     from scipy.interpolate import PchipInterpolator  # its import takes a quarter of a second
 
@@ -141,27 +138,11 @@ def _law(spanned: bool, share: np.ndarray, ratio: float) -> np.ndarray:
     place = np.log(inside)
     length = PchipInterpolator(nodes, length)(place)
     rows = np.exp([length, *(length + np.interp(place, nodes, bound) for bound in bounds)])
-    return rows * (_early_plug(share, inside) if spanned else _thin_body(share, inside))
-
-
-def _thin_body(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Ratio of r at A / W^2 to r at the first area of the table, for thinner half-discs.
-
-    They are in a shear flow, where r is proportional to the area. Its profile is a parabola, which
-    reduces r / A in proportion to the thickness.
-    """
-    thickness, first = np.sqrt(2 * share / np.pi), np.sqrt(2 * inside / np.pi)
-    return share / inside * (1 + THINNER * (first - thickness))
-
-
-def _early_plug(share: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """(3, n) r and its bounds at A / W^2 over those at the first area of the table.
-
-    Plugs with less area have just touched both walls.
-    """
-    factor = (share - ROUNDED) / (inside - ROUNDED)
-    return factor * np.stack([np.ones_like(share), 1 - EARLY * (inside - share),
-                              np.ones_like(share)])
+    if not spanned:
+        thickness, first = np.sqrt(2 * share / np.pi), np.sqrt(2 * inside / np.pi)
+        return rows * (share / inside * (1 + THINNER * (first - thickness)))
+    rows[1] *= 1 - EARLY * (inside - share)
+    return rows * ((share - ROUNDED) / (inside - ROUNDED))
 
 
 class Table(NamedTuple):

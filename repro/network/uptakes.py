@@ -147,12 +147,23 @@ class Throats:
                        self.supplies[:, selected], self.law)
 
     def uptake(self) -> np.ndarray:
-        """(3, n) uptake of acceptor and donor, um2 mg/L/h, and growth of the area, um2/h."""
+        """(3, n) uptake of acceptor and donor, um2 mg/L/h, and growth of the area, um2/h.
+
+        Both concentrations in the aggregate fall by the uptake of the donor.
+        """
         kinetics = self.law.rates.constants
-        donor = self._donor_uptake()
+        ratio = kinetics.acceptor_to_donor_ratio
+        acceptor_limit, donor_limit = self._inflows
+        most = np.minimum(acceptor_limit / ratio, donor_limit)
+        _, fastest = self._uptake_at(*self.supplies)
+
+        def rate(donor: np.ndarray) -> np.ndarray:
+            acceptor = self._concentration(0, self._acceptor_uptake(donor))
+            return self._uptake_at(acceptor, self._concentration(1, donor))[1]
+
+        donor = _balance(np.zeros_like(most), np.minimum(most, fastest), rate)
         acceptor = self._acceptor_uptake(donor)
-        need = kinetics.acceptor_to_donor_ratio * donor
-        decayed = (acceptor - need) / kinetics.decay_oxygen_demand
+        decayed = (acceptor - ratio * donor) / kinetics.decay_oxygen_demand
         growth = (kinetics.yield_coefficient * donor - decayed) / kinetics.maximum_density
         return np.stack([acceptor, donor, growth])
 
@@ -165,34 +176,17 @@ class Throats:
         peclet = self.inflow / self.law.diffusivities[1]
         return 1 + np.where(is_plug(self.share), 0.0, FAST * (peclet * self.share)**2)
 
-    def _donor_uptake(self) -> np.ndarray:
-        """(n,) uptake of the donor, by which both concentrations in the aggregate fall."""
-        acceptor_limit, donor_limit = self._inflows
-        ratio = self.law.rates.constants.acceptor_to_donor_ratio
-        most = np.minimum(acceptor_limit / ratio, donor_limit)
-        _, fastest = self._uptake_at(*self.supplies)
-
-        def rate(donor: np.ndarray) -> np.ndarray:
-            acceptor = self._concentration(0, self._acceptor_uptake(donor))
-            return self._uptake_at(acceptor, self._concentration(1, donor))[1]
-
-        return _balance(np.zeros_like(most), np.minimum(most, fastest), rate)
-
     def _acceptor_uptake(self, donor: np.ndarray) -> np.ndarray:
         """(n,) uptake of the acceptor: for the uptake of the donor (n,), and for decay."""
         need = self.law.rates.constants.acceptor_to_donor_ratio * donor
         spare = np.maximum(self.inflow * self.supplies[0] - need, 0.0)
-        most = need + np.minimum(self._largest_demand_of_decay, spare)
+        most = need + np.minimum(self._demand_of_decay(self.supplies[0]), spare)
         return _balance(need, most, lambda acceptor: (
             need + self._demand_of_decay(self._concentration(0, acceptor))))
 
     def _demand_of_decay(self, acceptor: np.ndarray) -> np.ndarray:
         """(n,) uptake of the acceptor without donor."""
         return self._uptake_at(acceptor, np.zeros_like(acceptor))[0]
-
-    @cached_property
-    def _largest_demand_of_decay(self) -> np.ndarray:
-        return self._demand_of_decay(self.supplies[0])
 
     def _uptake_at(self, acceptor: np.ndarray, donor: np.ndarray) -> np.ndarray:
         """(2, n) uptake of acceptor and donor at concentrations in the aggregates."""
@@ -202,33 +196,19 @@ class Throats:
     def _concentration(self, substrate: int, consumed: np.ndarray) -> np.ndarray:
         """(n,) mg/L in the aggregates that take up (n,) um2 mg/L/h of acceptor (0) or donor (1)."""
         supply, inflow = self.supplies[substrate], self._inflows[substrate]
-        unmixed, resistance = self._unmixed[substrate], self._resistances[substrate]
+        diffusivity = self.law.diffusivities[substrate]
+        sherwood, power, plug, plug_power = self._transport
+        unmixed = plug * self.inflow * self.share**plug_power / diffusivity  # P
         used = np.divide(consumed, inflow, out=np.zeros_like(consumed), where=supply > 0)
         used = np.clip(used, 1e-12, 1 - 1e-12)
         mean = (1 - used - unmixed * used / np.log1p(-used)) / (1 + unmixed)
+        resistance = 1 / (sherwood * self.share**power * diffusivity)  # 1 / (S D), h/um2
         return np.maximum(supply * mean - consumed * resistance, 0.0)
 
     @cached_property
     def _inflows(self) -> np.ndarray:
         """(2, n) inflow of both substrates, um2 mg/L/h."""
         return self.inflow * self.supplies
-
-    @cached_property
-    def _unmixed(self) -> np.ndarray:
-        """(2, n) P of both substrates."""
-        _, _, plug, plug_power = self._transport
-        return plug * self.inflow * self.share**plug_power / self._diffusivity
-
-    @cached_property
-    def _resistances(self) -> np.ndarray:
-        """(2, n) 1 / (S D) of both substrates, h/um2."""
-        sherwood, power, _, _ = self._transport
-        return 1 / (sherwood * self.share**power * self._diffusivity)
-
-    @property
-    def _diffusivity(self) -> np.ndarray:
-        """(2, 1) of both substrates in the aggregate, um2/h."""
-        return np.array(self.law.diffusivities)[:, None]
 
     @cached_property
     def _transport(self) -> np.ndarray:

@@ -148,20 +148,26 @@ def report(checked: SceneCheck) -> str:
     """Format a check as text."""
     lines = [f"{checked.scene}: can be run", "", "Model"]
     for section, words in checked.modelled:
-        lines += _item(section, words)
+        lines += textwrap.wrap(words, WIDTH, initial_indent=f"  {section:12}",
+                               subsequent_indent=" " * 14)
     nodes = f"about {checked.nodes}" if checked.estimated else f"{checked.nodes}"
     lines += ["", f"Mesh at t = 0: {nodes} nodes, {checked.triangles} triangles", ""]
+    outlook = checked.outlook
     lines += _cost(checked.cost)
-    if checked.outlook:
-        lines += ["", *_outlook(checked.outlook)]
+    if outlook:
+        heading = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
+        reason = outlook.stopped or "the end of the run"
+        lines += ["", *textwrap.wrap(f"{heading}: to t = {outlook.time:.4g} h: {reason}", WIDTH,
+                                     subsequent_indent="  ")]
+    if outlook and outlook.contact is not None:
+        lines += [f"  contact with the opposite wall from t = {outlook.contact:.3g} h on"]
     if checked.numbers:
-        lines += ["", *_numbers(checked.numbers, checked.outlook)]
-    lines += ["", *_warnings(checked.warnings)]
+        lines += ["", *_numbers(checked.numbers, outlook)]
+    lines += [""] if checked.warnings else ["", "All checked simplifications hold."]
+    for caveat in checked.warnings:
+        lines += textwrap.wrap(f"WARNING {caveat.key}: {caveat.text}.", WIDTH + 2,
+                               subsequent_indent="  ")
     return "\n".join(lines)
-
-
-def _item(name: str, words: str) -> list[str]:
-    return textwrap.wrap(words, WIDTH, initial_indent=f"  {name:12}", subsequent_indent=" " * 14)
 
 
 def _cost(estimate: Cost) -> Iterator[str]:
@@ -173,15 +179,6 @@ def _cost(estimate: Cost) -> Iterator[str]:
     yield (f"Cost, roughly: {duration(estimate.seconds)} ({steps}) without writing files; "
            f"{memory}")
     yield "  The estimate is right within a factor of three in the paper's pores."
-
-
-def _outlook(outlook: Outlook) -> Iterator[str]:
-    reason = outlook.stopped or "the end of the run"
-    heading = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
-    yield from textwrap.wrap(f"{heading}: to t = {outlook.time:.4g} h: {reason}", WIDTH,
-                             subsequent_indent="  ")
-    if outlook.contact is not None:
-        yield f"  contact with the opposite wall from t = {outlook.contact:.3g} h on"
 
 
 def duration(value: float) -> str:
@@ -201,11 +198,3 @@ def _numbers(computed: list[Number], outlook: Outlook | None) -> Iterator[str]:
     for name, definition in definitions.items():
         yield from textwrap.wrap(f"{name} = {definition}", WIDTH, initial_indent="    ",
                                  subsequent_indent="      ")
-
-
-def _warnings(warnings: list[Caveat]) -> Iterator[str]:
-    if not warnings:
-        yield "All checked simplifications hold."
-    for caveat in warnings:
-        yield from textwrap.wrap(f"WARNING {caveat.key}: {caveat.text}.", WIDTH + 2,
-                                 subsequent_indent="  ")

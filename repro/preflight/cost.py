@@ -11,7 +11,7 @@ must be free when a run begins.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from time import perf_counter
@@ -80,26 +80,19 @@ def run_trial(scene: Scene, nodes: int, advance: bool = True) -> Trial:
         scene = replace(scene, growth=replace(scene.growth, end=end),
                         output=replace(scene.output, times=(end,), every=None))
     clock = [perf_counter()]
-    run = _until_the_end(iterate_steps(scene))
+    run = iterate_steps(scene)
     first = needed(next(run)[1], "the first row")
     clock.append(perf_counter())
     worst = 0.0
-    for state, _ in islice(run, MOST_STEPS):
-        clock.append(perf_counter())
-        poll()
-        if exceeds_tolerance(state.step_control, scene.numerics.tolerance):
-            worst = max(worst, state.step_control.estimate)
+    with suppress(RunEnd):
+        for state, _ in islice(run, MOST_STEPS):
+            clock.append(perf_counter())
+            poll()
+            if exceeds_tolerance(state.step_control, scene.numerics.tolerance):
+                worst = max(worst, state.step_control.estimate)
     seconds = [b - a for a, b in zip(clock, clock[1:])]
     step = min(seconds[1:], default=0.0)
     return Trial(first, seconds[0], step, len(first.pore.mesh.points), worst)
-
-
-def _until_the_end(run: Iterator[ReportedStep]) -> Iterator[ReportedStep]:
-    """Yield the steps of a run until the scene or the model ends."""
-    try:
-        yield from run
-    except RunEnd:
-        return
 
 
 def estimate_cost(scene: Scene, trial: Trial, nodes: int, coarse: CoarseRun | None) -> Cost:

@@ -110,16 +110,12 @@ def _nodes(scene: Scene, extent: float, surface: list[tuple[float, float]]) -> f
     if numerics.gradation == 0:
         largest = min([largest, *(size for size, _ in surface)])
     corners = length * pore.width / (HEXAGON * largest**2) + 2 * (length + pore.width) / largest
-    corners += sum(_graded(piece, near, largest, numerics.gradation) for near, piece in surface)
+    for near, piece in surface:  # smaller elements on both sides of the surface
+        if near < largest:
+            thickness = (largest - near) / numerics.gradation
+            corners += 2 * piece / HEXAGON * ((1 / near - 1 / largest) / numerics.gradation
+                                              - thickness / largest**2)
     return float(corners) * (PER_CORNER if numerics.scheme.order == 2 else 1.0)
-
-
-def _graded(surface: float, near: float, largest: float, gradation: float) -> float:
-    """Additional nodes due to smaller elements on both sides of a surface (um)."""
-    if near >= largest:
-        return 0.0
-    thickness = (largest - near) / gradation
-    return 2 * surface / HEXAGON * ((1 / near - 1 / largest) / gradation - thickness / largest**2)
 
 
 def expected_bytes(scene: Scene, growth: float | None = None) -> float:
@@ -138,7 +134,7 @@ def require_outline(scene: Scene) -> None:
     try:
         resolution(scene)
         curves = {place: shapely.Polygon(outline.corners.points)
-                  for place, outline in zip(scene.places, initial_outlines(scene))}
+                  for place, outline in zip(scene.aggregate_keys, initial_outlines(scene))}
     except MeshError as error:
         raise SceneError(f"{scene.name}: {with_advice(error)}") from error
     for place, curve in curves.items():
@@ -189,19 +185,12 @@ def _fitting(scene: Scene, free: float) -> str:
 def free_bytes(root: Path = Path("/")) -> float:
     """Memory (bytes) that this process may still allocate.
 
-    It is the least of the free memory of the system and the remainders of the control groups and of
-    the address space of the process; infinite if unknown.
+    It is the least of the free memory of the system, without swapping, and the remainders of the
+    control groups and of the address space of the process; infinite if unknown.
     """
-    limits = [_available(root), *_groups(root), _address_space(root)]
-    return max(0.0, min(limits))
-
-
-def _available(root: Path) -> float:
-    """Free memory of the system, without swapping."""
-    for line in _lines(root / "proc/meminfo"):
-        if line.startswith("MemAvailable:"):
-            return 1024.0 * int(line.split()[1])
-    return math.inf
+    available = [1024.0 * int(line.split()[1]) for line in _lines(root / "proc/meminfo")
+                 if line.startswith("MemAvailable:")]
+    return max(0.0, min([*available, *_groups(root), _address_space(root)]))
 
 
 def _groups(root: Path) -> Iterator[float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from repro.march.simulation import row_times
-from repro.scene import Aggregate, Flow, Scene, scene_tables
+from repro.scene import Aggregate, Scene, scene_tables
 from repro.scene.time_table import TimeTable
 
 LEFT_OUT = {
@@ -69,16 +69,11 @@ def _flow(scene: Scene) -> Iterator[str]:
     else:
         yield f"driven by a head of {_over_time(flow.head, 1e-4, 'cm')} over the whole pore"
     if scene.aggregates:
-        yield _slowed_by(flow)
+        yield (f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
+               if flow.permeability is None else "an aggregate with a permeability of "
+               f"{1e-12 * flow.permeability:g} m2 (Brinkman's drag)")
         yield {"laplacian": "interface in the form of (1) [E2]",
                "traction": "continuous traction [E2]"}[scene.numerics.interface]
-
-
-def _slowed_by(flow: Flow) -> str:
-    """Describe the resistance of the aggregate to flow."""
-    if flow.permeability is None:
-        return f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
-    return f"an aggregate with a permeability of {1e-12 * flow.permeability:g} m2 (Brinkman's drag)"
 
 
 def _substrates(scene: Scene) -> Iterator[str]:
@@ -168,13 +163,10 @@ def _numerics(scene: Scene) -> Iterator[str]:
 
 def _output(scene: Scene) -> Iterator[str]:
     times = scene.requested_times
-    if times is None:
-        yield _every_step(scene) if scene.growth else "one row and fields at t = 0"
-    else:
+    if times is not None:
         yield f"rows and fields at {len({0.0, *times})} times, including t = 0"
-
-
-def _every_step(scene: Scene) -> str:
-    """Describe the rows of a scene without output.times."""
-    rows = row_times(scene)
-    return "rows and fields of every step" + (f", and every {rows[0]:g} h" if rows else "")
+    elif scene.growth:
+        rows = row_times(scene)
+        yield "rows and fields of every step" + (f", and every {rows[0]:g} h" if rows else "")
+    else:
+        yield "one row and fields at t = 0"

@@ -11,7 +11,7 @@ from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
 from repro.model.pore import Pore
 from repro.model.transport_in_time import transport_in_time
-from repro.polling import polling
+from repro.polling import OutOfTime, within
 from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Caveat, warn_surface
 from repro.scene import PRESETS, Scene, needed
@@ -21,10 +21,6 @@ from repro.schemes import CURVED
 LIMIT = 5.0
 #: Steps on a mesh with more nodes take a good part of this time.
 MOST_NODES = 5000
-
-
-class _OutOfTime(Exception):
-    """The time of a coarse run is over."""
 
 
 @dataclass(frozen=True)
@@ -60,33 +56,24 @@ class CoarseRun:
         self.warnings: dict[str, Caveat] = {}
 
     def run(self, report: Callable[[float], None], limit: float) -> Outlook:
-        """Make steps for ``limit`` s; report: receives the time (h) after each."""
+        """Make steps for ``limit`` s or to an end; report: receives the time (h) after each."""
         start = perf_counter()
-        stopped = self._stop(report, limit)
-        time = self.pore.time if self.pore else 0.0
-        return Outlook(time, stopped, self.contact, perf_counter() - start)
-
-    def _stop(self, report: Callable[[float], None], limit: float) -> str:
-        """Make steps for ``limit`` s or to an end; return why they stop, "" at growth.end."""
-        deadline = perf_counter() + limit
-
-        def check() -> None:
-            if perf_counter() > deadline:
-                raise _OutOfTime
-
+        stopped = ""
         try:
             if first_nodes(self.scene) > MOST_NODES:
-                return "the meshes of the preset sketch are too large"
-            with polling(check):
-                self._run(report)
+                stopped = "the meshes of the preset sketch are too large"
+            else:
+                with within(limit, perf_counter):
+                    self._run(report)
         except RunEnd as end:
             self.ends = True
-            return f"the run ends there: {end}"
-        except _OutOfTime:
-            return f"its {limit:g} s are over"
+            stopped = f"the run ends there: {end}"
+        except OutOfTime:
+            stopped = f"its {limit:g} s are over"
         except (SimulationError, StageError, ArithmeticError) as error:
-            return f"it fails there: {error.__cause__ or error}"
-        return ""
+            stopped = f"it fails there: {error.__cause__ or error}"
+        time = self.pore.time if self.pore else 0.0
+        return Outlook(time, stopped, self.contact, perf_counter() - start)
 
     def _run(self, report: Callable[[float], None]) -> None:
         nodes = []

@@ -18,7 +18,7 @@ from repro import results
 from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
 from repro.model.meshing import MOST_REFINED
-from repro.polling import polling
+from repro.polling import OutOfTime, poll, within
 from repro.preflight.memory import require_memory, require_outline
 from repro.results import names
 from repro.scene import FINER, PRESETS, Scene, SceneError, Source, label, load_scene
@@ -36,10 +36,6 @@ INTERVALS = 24
 WIDTH = 110
 #: Digits of the times (h) of common rows.
 DIGITS = 9
-
-
-class _OutOfTime(Exception):
-    """The processor time of both runs is over."""
 
 
 @dataclass(frozen=True)
@@ -96,17 +92,13 @@ class FinerComparison:
         heading = (f"{self.scene}: {self.own} compared with {self.finer}, {self.rows} common rows "
                    f"to t = {self.time:.4g} h: {reason} ({self.seconds:.2g} s of processor time, "
                    f"at most {self.limit:g} s)")
+        lines = [f"  {each.column:34}{f'{each.difference:.2g} {each.unit}':>12}{each.time:>10.4g}"
+                 f"{each.own:>12.5g}{each.finer:>12.5g}" for each in self.differences]
         return "\n".join([*textwrap.wrap(heading, WIDTH, subsequent_indent="  "), "",
                           f"{'Largest difference':48}{'at t (h)':>10}{'own':>12}{'finer':>12}",
-                          *map(_line, self.differences), "",
+                          *lines, "",
                           *textwrap.wrap(self.sentence, WIDTH), "",
                           "This is the change of the results, and no bound of their error."])
-
-
-def _line(each: Difference) -> str:
-    change = f"{each.difference:.2g} {each.unit}"
-    return (f"  {each.column:34}{change:>12}{each.time:>10.4g}{each.own:>12.5g}"
-            f"{each.finer:>12.5g}")
 
 
 @typed
@@ -174,9 +166,15 @@ def compare_with_finer(scene: Scene, file: str, limit: float,
     times = [time for time in own.rows if time in other.rows]
     if not times:
         raise SceneError(f"{file}: no row to compare: {stopped}")
+    differences = []
+    for name in own.rows[times[0]]:
+        values = np.array([(time, own.rows[time][name], other.rows[time][name]) for time in times],
+                          float)
+        values = values[np.isfinite(values).all(axis=1)]
+        if len(values) and name not in names.NOT_COMPARED:
+            differences.append(_largest(name, *values.T))
     return FinerComparison(scene.name, _describe(scene), _describe(finer), times[-1], len(times),
-                           stopped, process_time() - begun, limit,
-                           _largest_differences(own, other, times))
+                           stopped, process_time() - begun, limit, differences)
 
 
 def refine(scene: Scene) -> Scene:
@@ -243,33 +241,15 @@ class _Run:
 
 def _advance_both(own: _Run, finer: _Run, limit: float, report: Callable[[float], None]) -> str:
     """Advance the run that is behind until it stops; return why it stops, "" at the end."""
-    deadline = process_time() + limit
-
-    def check() -> None:
-        if process_time() > deadline:
-            raise _OutOfTime
-
     try:
-        with polling(check):
+        with within(limit, process_time):
             while (behind := min(own, finer, key=lambda run: run.time)).stopped is None:
-                check()
+                poll()
                 behind.step()
                 report(max(0.0, min(own.time, finer.time)))
-    except _OutOfTime:
+    except OutOfTime:
         return f"the {limit:g} s are over"
     return "; ".join(filter(None, (own.stopped, finer.stopped)))
-
-
-def _largest_differences(own: _Run, finer: _Run, times: list[float]) -> list[Difference]:
-    """Return the largest difference of each column that both runs have at these times (h)."""
-    computed = []
-    for name in own.rows[times[0]]:
-        values = np.array([(time, own.rows[time][name], finer.rows[time][name]) for time in times],
-                          float)
-        values = values[np.isfinite(values).all(axis=1)]
-        if len(values) and name not in names.NOT_COMPARED:
-            computed.append(_largest(name, *values.T))
-    return computed
 
 
 def _largest(name: str, times: np.ndarray, own: np.ndarray, finer: np.ndarray) -> Difference:

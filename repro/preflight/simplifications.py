@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 from repro.fem import sizing
 from repro.march.step_control import SHORTEST
@@ -122,7 +123,8 @@ def _cells(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 def _diffusivities(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if only one of two related values of Table 1 is changed."""
     for name, substrate in scene.substrates.modelled.items():
-        table = type(substrate)(supply=substrate.supply)
+        kind: Any = type(substrate)
+        table = kind()
         inside = substrate.diffusivity_in_aggregate
         if substrate.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
             yield Caveat(f"substrates.{name}.diffusivity_in_aggregate", "it still has the "
@@ -198,33 +200,27 @@ def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 
 
 def _fronts(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn of layers thinner than elements, and of fronts of zero order that elements widen: see
+    :meth:`RateLaw.on`."""
     thickness = sizes.thickness
-    nodes = _interface_size(scene, thickness) / scene.numerics.scheme.order
+    size = _interface_size(scene, thickness)
+    nodes = size / scene.numerics.scheme.order
+    front = THINNEST * math.sqrt(math.sqrt(3) / 4) * size  # equilateral triangles
     for uptake in numbers.uptakes(scene):
-        layer = uptake.layer
-        if uptake.law.sharp:
-            yield from _widened_front(scene, uptake, thickness)
-        elif layer < min(nodes, thickness):
+        layer, depth = uptake.layer, uptake.depth
+        lost = (front / depth) ** 2 if uptake.law.sharp and depth else 0.0
+        if lost > FRONT_LOSS:
+            yield Caveat("numerics.refinement", f"elements widen the front behind which there is "
+                         f"no {uptake.name} to {front:.2g} um, of {depth:.2g} um that the supply "
+                         f"reaches: uptake may be {100 * lost:.2g} % too small"
+                         + _resolving(resolution(scene) * (lost / FRONT_LOSS) ** 0.5))
+        elif not uptake.law.sharp and layer < min(nodes, thickness):
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
             yield Caveat("numerics.refinement", f"the {uptake.name} is used up in a {kind} "
                          f"of thickness (D K_s / (q X_m))^1/2 = {layer:.2g} um, thinner than the "
                          f"{nodes:.2g} um between nodes in the aggregate (a run checks the front "
                          "in its solution)" + _resolving(resolution(scene) * nodes / layer))
-
-
-def _widened_front(scene: Scene, uptake: numbers.Uptake,
-                   thickness: float) -> Iterator[Caveat]:
-    """The uptake of a layer that a front of zero order loses on elements of the interface's size:
-    see :meth:`RateLaw.on`."""
-    size = _interface_size(scene, thickness)
-    front = THINNEST * math.sqrt(math.sqrt(3) / 4) * size  # equilateral triangles
-    lost = (front / uptake.depth) ** 2 if uptake.depth else 0.0
-    if lost > FRONT_LOSS:
-        yield Caveat("numerics.refinement", f"elements widen the front behind which there is no "
-                     f"{uptake.name} to {front:.2g} um, of {uptake.depth:.2g} um that the supply "
-                     f"reaches: uptake may be {100 * lost:.2g} % too small"
-                     + _resolving(resolution(scene) * (lost / FRONT_LOSS) ** 0.5))
 
 
 def _interface_size(scene: Scene, thickness: float) -> float:
@@ -264,8 +260,8 @@ def _seed_film(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat
     share = min(1.0, gap / film(scene))
     nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.scheme.order
     if nodes < ACROSS_FILM:
-        place, seed = max(zip(scene.places, scene.aggregates), key=lambda each: each[1].height(
-            scene.pore.width))
+        place, seed = max(zip(scene.aggregate_keys, scene.aggregates),
+                          key=lambda each: each[1].height(scene.pore.width))
         key = f"{place}.radius" if seed.outline is None else f"{place}.outline"
         yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "
                      f"{nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its flow "

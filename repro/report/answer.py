@@ -9,8 +9,9 @@ import numpy as np
 from repro.report import charts, fields, page, quantities
 from repro.report.reading import Run
 from repro.results import field_files, names
-from repro.results.columns import DETACHED
+from repro.results.columns import DETACHED, SUBSTRATES
 from repro.results.field_files import Grid
+from repro.results.outlines import boundary
 
 #: Rows of the table, and outlines in the picture, without a row for the contact.
 SEVERAL = 5
@@ -18,12 +19,6 @@ SEVERAL = 5
 UNCHANGED = 1e-3
 WIDTH = 640  # of the picture
 MARGIN = 8
-#: Edges of a triangle by its nodes: two corners and, if sides are curved, the middle.
-EDGES: dict[int, list[tuple[int, ...]]] = {
-    3: [(0, 1), (1, 2), (2, 0)],
-    6: [(0, 1, 3), (1, 2, 4), (2, 0, 5)]}
-
-
 def build(run: Run) -> str:
     """Sentence, table and picture; a sentence alone of a run without rows."""
     if not len(run.times):
@@ -33,45 +28,33 @@ def build(run: Run) -> str:
 
 
 def sentence(run: Run) -> str:
-    """The answer in words: last row, end, contact, conductivity, effluents."""
+    """The answer in words: last row, end, contact, conductivity, effluents.
+
+    It names the end that the scene asks for; the status of the run names any other one.
+    """
     count, last = len(run.times), run.times[-1]
+    columns = _columns(run)
     parts = [f"{count} rows, to t = {last:g} h." if count > 1 else f"One row, at t = {last:g} h."]
     if count > 1 and "growth" in run.record["tables"]:
-        parts += [_end(run), _contact(run)]
-    parts += [_detached(run), _change("conductivity", "conductivity_m_per_d", run, ratio=True)]
-    parts += [_change(f"{name} in the effluent", f"effluent_{name}_mg_per_L", run)
-              for name in ("acceptor", "donor")]
-    if "conductivity_m_per_d" not in _columns(run) and count > 1:
-        parts.append(_change("area of the aggregate", "aggregate_area_um2", run, ratio=True))
-    return " ".join(filter(None, parts))
-
-
-def _detached(run: Run) -> str:
-    """The times at which aggregates have left the pore; empty if none has."""
+        if run.record.get("status") == "completed":
+            parts.append("The run reaches growth.end.")
+        touching = quantities.contact(run)
+        parts.append(f"An aggregate touches the opposite wall from t = {touching[0]:.6g} h on."
+                     if touching else "No aggregate touches the opposite wall.")
     masses = run.ledger.get(DETACHED.name, np.zeros(0))
-    if not masses.any():
-        return ""
-    times = ", ".join(f"{time:.6g}" for time in run.ledger["end_h"][masses > 0])
-    return f"An aggregate leaves the pore at t = {times} h."
+    if masses.any():
+        times = ", ".join(f"{time:.6g}" for time in run.ledger["end_h"][masses > 0])
+        parts.append(f"An aggregate leaves the pore at t = {times} h.")
+    changes = {"conductivity_m_per_d": "conductivity",
+               **{f"effluent_{name}_mg_per_L": f"{name} in the effluent" for name in SUBSTRATES}}
+    if "conductivity_m_per_d" not in columns and count > 1:
+        changes["aggregate_area_um2"] = "area of the aggregate"
+    parts += [_change(noun, name, run) for name, noun in changes.items() if name in columns]
+    return " ".join(parts)
 
 
-def _end(run: Run) -> str:
-    """The end that the scene asks for; the status of the run names any other one."""
-    reached = run.record.get("status") == "completed"
-    return "The run reaches growth.end." if reached else ""
-
-
-def _contact(run: Run) -> str:
-    touching = quantities.contact(run)
-    if touching:
-        return f"An aggregate touches the opposite wall from t = {touching[0]:.6g} h on."
-    return "No aggregate touches the opposite wall."
-
-
-def _change(noun: str, name: str, run: Run, ratio: bool = False) -> str:
-    """The first and the last value of a column; ratio: with the factor between them."""
-    if name not in _columns(run):
-        return ""
+def _change(noun: str, name: str, run: Run) -> str:
+    """The first and the last value of a column, and the factor between those of the pore."""
     values = run.series[name]
     first, last = values[np.isfinite(values)][[0, -1]]
     if abs(last - first) <= UNCHANGED * abs(first):
@@ -79,12 +62,13 @@ def _change(noun: str, name: str, run: Run, ratio: bool = False) -> str:
         return f"The {noun} {stays} {_short(first)} {names.unit(name)}."
     verb = "falls" if last < first else "rises"
     low, high = sorted((first, last))
-    factor = f", by a factor of {_short(high / low)}" if ratio and low > 0 else ""
+    has_factor = low > 0 and not name.startswith("effluent")
+    factor = f", by a factor of {_short(high / low)}" if has_factor else ""
     return f"The {noun} {verb} from {_short(first)} to {_short(last)} {names.unit(name)}{factor}."
 
 
 def _short(value: float) -> str:
-    return charts.number(float(f"{value:.3g}"))
+    return charts.number(float(f"{value:.3g}")) if np.isfinite(value) else "-"
 
 
 def _columns(run: Run) -> list[str]:
@@ -96,12 +80,8 @@ def _rows(run: Run) -> list[list[str]]:
     evenly = np.linspace(run.times[0], run.times[-1], SEVERAL)
     times = {*(run.times[np.abs(run.times - time).argmin()] for time in evenly),
              *quantities.contact(run)}
-    return [[f"{time:.6g}", *(_cell(run.series[name][run.times == time][-1])
+    return [[f"{time:.6g}", *(_short(run.series[name][run.times == time][-1])
                               for name in _columns(run))] for time in sorted(times)]
-
-
-def _cell(value: float) -> str:
-    return _short(value) if np.isfinite(value) else "-"
 
 
 def _picture(run: Run) -> str:
@@ -136,13 +116,10 @@ def outlines(times: list[float], grids: list[Grid]) -> str:
 
 def _sides(grid: Grid) -> np.ndarray:
     """(E, 3, 2) um: start, middle and end of each side of a triangle on an outline."""
-    cells = grid.cells[grid.cell_data["region"] > 0.5]
-    edges = np.vstack([cells[:, edge] for edge in EDGES[grid.cells.shape[1]]])
-    _, first, counts = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True,
-                                 return_counts=True)
-    nodes = grid.points[edges[first[counts == 1]], :2]
-    middle = nodes[:, 2] if nodes.shape[1] == 3 else nodes.mean(axis=1)
-    return np.stack([nodes[:, 0], middle, nodes[:, 1]], axis=1)
+    edges, _ = boundary(grid.cells, grid.cell_data["region"] > 0.5)
+    nodes = grid.points[edges, :2]
+    middle = nodes[:, 1] if nodes.shape[1] == 3 else nodes.mean(axis=1)
+    return np.stack([nodes[:, 0], middle, nodes[:, -1]], axis=1)
 
 
 def _path(sides: np.ndarray, colour: int) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 
 import numpy as np
@@ -69,12 +69,9 @@ class Scale:
     words: Sequence[str] = ()
 
     def __call__(self, value):
-        low, high = self._even(self.low), self._even(self.high)
-        return self.start + (self._even(value) - low) / (high - low) * (self.end - self.start)
-
-    def _even(self, value):
-        """The value, or its logarithm on a logarithmic axis."""
-        return np.log10(value) if self.log else np.asarray(value, float)
+        even = np.log10 if self.log else np.asarray
+        low, high = even(self.low), even(self.high)
+        return self.start + (even(value) - low) / (high - low) * (self.end - self.start)
 
 
 def across(low: float, high: float, log: bool = False, words: Sequence[str] = ()) -> Scale:
@@ -90,30 +87,49 @@ def upwards(low: float, high: float, log: bool = False) -> Scale:
 def svg(chart: Chart) -> str:
     """A figure with title, legend and drawing."""
     lines = [thinned(line) for line in chart.lines]
-    x, y = _scales(lines)
-    marks = "".join(_mark(x, time) for time in chart.marks if x.low <= time <= x.high)
+    times = np.concatenate([line.times for line in lines])
+    values = np.concatenate([line.values[np.isfinite(line.values)] for line in lines])
+    log = is_wide(values)
+    first, last = float(times.min()), float(times.max())
+    x = across(first, last if last > first else first + 1)
+    y = upwards(*limits(values, log), log)
+    upright = f'y1="{TOP}" y2="{HEIGHT - BOTTOM}"'
+    places = [f"{x(time):.1f}" for time in chart.marks if x.low <= time <= x.high]
+    marks = "".join(f'<line class="mark" x1="{place}" x2="{place}" {upright}/>' for place in places)
     marks += "".join(curve(x, y, line.times, line.values, k, dots=line.dots)
                      for k, line in enumerate(lines))
-    marks += (f'<line class="now" x1="0" x2="0" y1="{TOP}" y2="{HEIGHT - BOTTOM}" '
-              'visibility="hidden"/>')
+    marks += f'<line class="now" x1="0" x2="0" {upright} visibility="hidden"/>'
     plot = drawing(x, y, ("time (h)", chart.axis), f"{chart.title} over time", marks)
+    entries = "".join(f"<span>{swatch(k, line.dots)}{escape(line.label)}</span>"
+                      for k, line in enumerate(lines))
+    legend = f'<span class="legend">{entries}</span>' if len(lines) > 1 else ""
     return (f'<figure class="chart" data-chart="{escape(_pointer_data(lines, x))}">'
-            f"<figcaption>{escape(chart.title)}{_legend(lines)}</figcaption>"
+            f"<figcaption>{escape(chart.title)}{legend}</figcaption>"
             f"{plot}<output>&nbsp;</output></figure>")
 
 
 def drawing(x: Scale, y: Scale, axes: tuple[str, str], label: str, marks: str) -> str:
-    """The drawing without title; axes: labels of x and y; label: description in words."""
+    """The drawing without title; axes: labels of x and y; label: description in words.
+
+    A grid of horizontal lines has the values, and the axis below has ticks.
+    """
+    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
+    rows = "".join(f'<line class="grid" x1="{LEFT}" x2="{right}" '
+                   f'y1="{y(value):.1f}" y2="{y(value):.1f}"/>'
+                   f'<text class="y" x="{LEFT - 5}" y="{y(value) + 3.5:.1f}">{escape(text)}</text>'
+                   for value, text in ticks(y, 4))
+    columns = "".join(f'<line class="tick" x1="{x(value):.1f}" x2="{x(value):.1f}" '
+                      f'y1="{bottom}" y2="{bottom + 4}"/>'
+                      f'<text class="x" x="{x(value):.1f}" y="{bottom + 15}">{escape(text)}</text>'
+                      for value, text in ticks(x))
+    axis = f'<line class="tick" x1="{LEFT}" x2="{right}" y1="{bottom}" y2="{bottom}"/>'
+    center, middle = (LEFT + right) / 2, (TOP + bottom) / 2
+    up = axes[1] + " (log scale)" * y.log
     return (f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(label)}">'
-            f"{_grid(x, y)}{marks}{_names(axes[0], axes[1] + ' (log scale)' * y.log)}</svg>")
-
-
-def _names(right: str, up: str) -> str:
-    """The labels of the axes, below and on the left."""
-    center, middle = (LEFT + WIDTH - RIGHT) / 2, (TOP + HEIGHT - BOTTOM) / 2
-    return (f'<text class="name" x="{center:g}" y="{HEIGHT - 4}">{escape(right)}</text>'
+            f"{rows}{columns}{axis}{marks}"
+            f'<text class="name" x="{center:g}" y="{HEIGHT - 4}">{escape(axes[0])}</text>'
             f'<text class="name" transform="translate(10 {middle:g}) rotate(-90)">'
-            f"{escape(up)}</text>")
+            f"{escape(up)}</text></svg>")
 
 
 def thinned(line: Line) -> Line:
@@ -121,16 +137,7 @@ def thinned(line: Line) -> Line:
     if len(line.times) <= MOST_POINTS:
         return line
     chosen = np.linspace(0, len(line.times) - 1, MOST_POINTS).round().astype(int)
-    return Line(line.label, line.times[chosen], line.values[chosen], line.dots)
-
-
-def _scales(lines: Sequence[Line]) -> tuple[Scale, Scale]:
-    times = np.concatenate([line.times for line in lines])
-    values = np.concatenate([line.values[np.isfinite(line.values)] for line in lines])
-    log = is_wide(values)
-    first, last = float(times.min()), float(times.max())
-    return (across(first, last if last > first else first + 1),
-            upwards(*limits(values, log), log))
+    return replace(line, times=line.times[chosen], values=line.values[chosen])
 
 
 def is_wide(values: Sequence[float] | np.ndarray) -> bool:
@@ -139,11 +146,21 @@ def is_wide(values: Sequence[float] | np.ndarray) -> bool:
 
 
 def limits(values: Sequence[float] | np.ndarray, log: bool) -> tuple[float, float]:
-    """The round ends of an axis that shows these values."""
+    """The round ends of an axis that shows these values.
+
+    A linear axis begins at zero if zero is near, and contains a constant.
+    """
     low, high = float(min(values)), float(max(values))
     if log:
         return 10.0 ** math.floor(math.log10(low)), 10.0 ** math.ceil(math.log10(high))
-    return _roomy(low, high)
+    span = high - low
+    if span <= EQUAL * max(abs(low), abs(high)):
+        span = abs(high) or 1.0
+        return min(low, 0.0) - 0.1 * span * (low < 0), max(high, 0.0) + 0.1 * span * (high >= 0)
+    low = 0.0 if 0 < low < 0.5 * high else low
+    high = 0.0 if 0 > high > 0.5 * low else high
+    step = _step(high - low, 4)
+    return math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step
 
 
 def padded(values: Sequence[float], log: bool) -> tuple[float, float]:
@@ -156,18 +173,6 @@ def padded(values: Sequence[float], log: bool) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _roomy(low: float, high: float) -> tuple[float, float]:
-    """A range with round ends. It begins at zero if zero is near, and contains a constant."""
-    span = high - low
-    if span <= 1e-9 * max(abs(low), abs(high)) or span == 0:
-        span = abs(high) or 1.0
-        return (min(low, 0.0) - 0.1 * span * (low < 0), max(high, 0.0) + 0.1 * span * (high >= 0))
-    low = 0.0 if 0 < low < 0.5 * high else low
-    high = 0.0 if 0 > high > 0.5 * low else high
-    step = _step(high - low, 4)
-    return math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step
-
-
 def _step(span: float, parts: int) -> float:
     """The step, 1, 2 or 5 times a power of ten, that divides a span into about `parts` parts."""
     power = 10.0 ** math.floor(math.log10(span / parts))
@@ -175,27 +180,26 @@ def _step(span: float, parts: int) -> float:
 
 
 def ticks(scale: Scale, parts: int = 5) -> list[tuple[float, str]]:
-    """Round values within a scale with their texts, or its words."""
+    """Round values within a scale with their texts, or its words.
+
+    A logarithmic scale has about six powers of ten; within three decades also 2 and 5 times these.
+    """
     if scale.words:
         return [(float(place), word) for place, word in enumerate(scale.words)]
-    if scale.log:
-        return [(value, number(value)) for value in _log_ticks(scale)]
-    step = _step(scale.high - scale.low, parts)
-    steps = range(math.ceil(scale.low / step - 1e-6), math.floor(scale.high / step + 1e-6) + 1)
-    digits = -math.floor(math.log10(step) + 1e-9)
-    return [(k * step, number(k * step, digits)) for k in steps]
-
-
-def _log_ticks(scale: Scale) -> list[float]:
-    """About six powers of ten; within three decades also 2 and 5 times these."""
+    if not scale.log:
+        step = _step(scale.high - scale.low, parts)
+        steps = range(math.ceil(scale.low / step - 1e-6), math.floor(scale.high / step + 1e-6) + 1)
+        digits = -math.floor(math.log10(step) + 1e-9)
+        return [(k * step, number(k * step, digits)) for k in steps]
     low, high = scale.low * (1 - 1e-9), scale.high * (1 + 1e-9)
     first = math.floor(math.log10(scale.low) + 1e-9)
     last = math.ceil(math.log10(scale.high) - 1e-9)
-    steps = (1, 2, 5) if high < 999 * low else (1,)
-    powers = [10.0**k for k in range(first, last + 1, -(-(last - first) // 6))]
-    values = [step * power for power in powers for step in steps]
+    factors = (1, 2, 5) if high < 999 * low else (1,)
+    powers = range(first, last + 1, -(-(last - first) // 6))
+    values = [factor * 10.0**power for power in powers for factor in factors]
     visible = [value for value in values if low <= value <= high]
-    return visible if len(visible) > 1 else [scale.low, scale.high]
+    return [(value, number(value))
+            for value in (visible if len(visible) > 1 else (scale.low, scale.high))]
 
 
 def number(value: float, digits: int | None = None) -> str:
@@ -212,52 +216,20 @@ def number(value: float, digits: int | None = None) -> str:
     return f"{value:.{max(0, digits)}f}" if digits is not None else f"{value:.6g}"
 
 
-def _grid(x: Scale, y: Scale) -> str:
-    """Horizontal lines with their values, and the axis below with its ticks."""
-    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
-    rows = "".join(_row(y(value), text) for value, text in ticks(y, 4))
-    columns = "".join(_tick(x(value), text) for value, text in ticks(x))
-    axis = f'<line class="tick" x1="{LEFT}" x2="{right}" y1="{bottom}" y2="{bottom}"/>'
-    return rows + columns + axis
-
-
-def _row(position: float, text: str) -> str:
-    """A horizontal line of the grid, with its value."""
-    return (f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" '
-            f'y1="{position:.1f}" y2="{position:.1f}"/>'
-            f'<text class="y" x="{LEFT - 5}" y="{position + 3.5:.1f}">{escape(text)}</text>')
-
-
-def _tick(position: float, text: str) -> str:
-    """A tick of the axis below, with its value."""
-    bottom = HEIGHT - BOTTOM
-    return (f'<line class="tick" x1="{position:.1f}" x2="{position:.1f}" '
-            f'y1="{bottom}" y2="{bottom + 4}"/>'
-            f'<text class="x" x="{position:.1f}" y="{bottom + 15}">{escape(text)}</text>')
-
-
-def _mark(x: Scale, time: float) -> str:
-    position = f"{x(time):.1f}"
-    return f'<line class="mark" x1="{position}" x2="{position}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
-
-
 def curve(x: Scale, y: Scale, coordinates: np.ndarray, values: np.ndarray, colour: int,
           title: str = "", dots: bool = False) -> str:
     """Values (n,) at coordinates (n,): lines between gaps; dots for single points, or for all."""
-    drawable = np.flatnonzero(_is_drawable(x, coordinates) & _is_drawable(y, values))
+    is_drawable = np.isfinite(coordinates) & np.isfinite(values)
+    for scale, numbers in ((x, coordinates), (y, values)):
+        is_drawable &= (numbers > 0) | (not scale.log)
+    drawable = np.flatnonzero(is_drawable)
     pieces = np.split(drawable, np.flatnonzero(np.diff(drawable) > 1) + 1)
-    polylines = [list(map(point, x(coordinates[piece]), y(values[piece]))) for piece in pieces]
-    return "".join(_piece(points, colour, title, dots) for points in polylines)
-
-
-def _is_drawable(scale: Scale, values: np.ndarray) -> np.ndarray:
-    return np.isfinite(values) & ((values > 0) | (not scale.log))
-
-
-def _piece(points: list[str], colour: int, title: str, dots: bool) -> str:
-    if len(points) > 1 and not dots:
-        return polyline(points, colour, title)
-    return "".join(dot(place, colour, title) for place in points)
+    drawn = ""
+    for piece in pieces:
+        points = list(map(point, x(coordinates[piece]), y(values[piece])))
+        drawn += (polyline(points, colour, title) if len(points) > 1 and not dots else
+                  "".join(dot(place, colour, title) for place in points))
+    return drawn
 
 
 def point(x: float, y: float) -> str:
@@ -292,14 +264,6 @@ def _element(name: str, attributes: str, title: str) -> str:
     return f"<{name} {attributes}><title>{escape(title)}</title></{name}>"
 
 
-def _legend(lines: Sequence[Line]) -> str:
-    if len(lines) < 2:
-        return ""
-    entries = "".join(f"<span>{swatch(k, line.dots)}{escape(line.label)}</span>"
-                      for k, line in enumerate(lines))
-    return f'<span class="legend">{entries}</span>'
-
-
 def swatch(k: int, dots: bool = False) -> str:
     """A sample of a line for a legend."""
     kind = dot("12,5", k) if dots else polyline(["0,5", "24,5"], k)
@@ -311,11 +275,10 @@ def _pointer_data(lines: Sequence[Line], x: Scale) -> str:
 
     The axis is four numbers: its first and last time, and their positions in the drawing.
     """
-    numbers = [{"label": line.label, "t": _short(line.times), "y": _short(line.values)}
+    def short(values: np.ndarray) -> list[float | None]:
+        return [float(f"{value:.6g}") if math.isfinite(value) else None for value in values]
+
+    numbers = [{"label": line.label, "t": short(line.times), "y": short(line.values)}
                for line in lines]
     pointer_data = {"axis": [x.low, x.high, x.start, x.end], "lines": numbers}
     return json.dumps(pointer_data, separators=(",", ":"), allow_nan=False)
-
-
-def _short(values: np.ndarray) -> list[float | None]:
-    return [float(f"{value:.6g}") if math.isfinite(value) else None for value in values.tolist()]

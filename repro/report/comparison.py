@@ -11,6 +11,7 @@ import numpy as np
 from repro.report import charts, page, quantities
 from repro.report.reading import Run
 from repro.results import names
+from repro.results.quantities import none_if_nan
 from repro.scene.units import alike
 
 #: A value of this many times another one is not a percentage any more.
@@ -20,8 +21,11 @@ TIMES = 10.0
 def build(runs: Sequence[Run]) -> str:
     """The text of the page, which compares each further run with the first one."""
     labels = short([run.folder for run in runs])
+    differing = page.table("", ["key", *labels], differences(runs))
+    nothing = "<p>Nothing: the scenes are the same.</p>"
     figures = "".join(map(charts.svg, quantities.overlaid(runs, labels)))
-    body = (_head(runs, labels) + _scenes(runs, labels) + _values(runs, labels)
+    body = (_head(runs, labels) + page.section("What differs in the scenes", differing or nothing)
+            + _values(runs, labels)
             + page.section("Over time", f'<div class="charts">{figures}</div>' if figures else ""))
     return page.page("Runs compared", body, ["errors.js", "charts.js"])
 
@@ -35,19 +39,13 @@ def short(folders: Sequence[Path]) -> list[str]:
 
 
 def _head(runs: Sequence[Run], labels: Sequence[str]) -> str:
-    rows = "".join(map(_item, range(len(runs)), runs, labels))
+    rows = ""
+    for k, (run, label) in enumerate(zip(runs, labels)):
+        last = f" to t = {run.times[-1]:.6g} h" if len(run.times) else ", no row"
+        ended = f"{run.record['scene']}, {run.record['status']}{last}"
+        rows += (f"<li>{charts.swatch(k)}<b>{escape(label)}</b>: {escape(ended)}; "
+                 f"{escape(str(run.folder))}</li>")
     return f'<header><h1>{len(runs)} runs compared</h1><ul class="runs">{rows}</ul></header>\n'
-
-
-def _item(k: int, run: Run, label: str) -> str:
-    """Run number k in the list of runs."""
-    return (f"<li>{charts.swatch(k)}<b>{escape(label)}</b>: {escape(_describe_run(run))}; "
-            f"{escape(str(run.folder))}</li>")
-
-
-def _describe_run(run: Run) -> str:
-    last = f" to t = {run.times[-1]:.6g} h" if len(run.times) else ", no row"
-    return f"{run.record['scene']}, {run.record['status']}{last}"
 
 
 def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
@@ -57,23 +55,9 @@ def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
     """
     scenes = [page.flat(run.record["tables"]) for run in runs]
     keys = dict.fromkeys(key for keys in scenes for key in keys)
-    return [(key, *_value_texts(key, scenes)) for key in keys if _differs(key, scenes)]
-
-
-def _differs(key: str, scenes: Sequence[dict[str, object]]) -> bool:
-    """Does the value of a key in any scene differ from that in the first one?"""
-    return not all(alike(keys.get(key), scenes[0].get(key)) for keys in scenes)
-
-
-def _value_texts(key: str, scenes: Sequence[dict[str, object]]) -> list[str]:
-    """The value of a key in each scene, as text."""
-    return [page.format_value(keys[key]) if key in keys else "-" for keys in scenes]
-
-
-def _scenes(runs: Sequence[Run], labels: Sequence[str]) -> str:
-    differing = page.table("", ["key", *labels], differences(runs))
-    nothing = "<p>Nothing: the scenes are the same.</p>"
-    return page.section("What differs in the scenes", differing or nothing)
+    return [(key, *(page.format_value(scene[key]) if key in scene else "-" for scene in scenes))
+            for key in keys
+            if not all(alike(scene.get(key), scenes[0].get(key)) for scene in scenes)]
 
 
 def common_time(runs: Sequence[Run]) -> float | None:
@@ -85,18 +69,10 @@ def values(runs: Sequence[Run], time: float) -> dict[str, list[float | None]]:
     """The value of each column in each run at a time (h), linear between rows; None if unknown."""
     columns = dict.fromkeys(name for run in runs for name in run.series
                             if name not in names.NOT_COMPARED)
-    return {name: _in_each(runs, name, time) for name in columns}
 
-
-def _in_each(runs: Sequence[Run], name: str, time: float) -> list[float | None]:
-    return [_at(run, name, time) for run in runs]
-
-
-def _at(run: Run, name: str, time: float) -> float | None:
-    if name not in run.series or not len(run.times) or time < run.times[0]:
-        return None
-    value = float(np.interp(time, run.times, run.series[name]))
-    return value if np.isfinite(value) else None
+    return {name: [none_if_nan(np.interp(time, run.times, run.series.get(name, run.times * np.nan),
+                                         left=np.nan) if len(run.times) else np.nan)
+                   for run in runs] for name in columns}
 
 
 def _values(runs: Sequence[Run], labels: Sequence[str]) -> str:

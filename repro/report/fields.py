@@ -8,7 +8,6 @@ only its nodes or triangles, in ascending order.
 from __future__ import annotations
 
 import base64
-import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,6 +17,7 @@ from repro.errors import OutputError
 from repro.fem.transfer import located
 from repro.results import field_files, names
 from repro.results.arrays import ARRAYS
+from repro.results.drawing import magnitude
 from repro.results.field_files import Grid
 from repro.results.files import MOST_TABLE, read
 
@@ -27,8 +27,6 @@ MOST_NODES = 10_000  # of a frame; a finer mesh is shown on a regular grid of so
 #: The note on a frame of the grown aggregate before it expands (Plate 1).
 BEFORE = "before the expansion"
 LEVELS = 65534  # of a value; one more for no value
-_FILE = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
-
 #: The fields that a reader can choose, in this order.
 FIELDS = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
 theta J largest_principal_stress_MPa stress_xx_MPa stress_yy_MPa stress_zz_MPa stress_xy_MPa
@@ -53,7 +51,7 @@ def listed_files(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Pa
     except (OSError, ElementTree.ParseError) as error:
         raise OutputError(f"{folder / name}: it cannot be read: {error}") from error
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
-    return [(time, folder / name) for time, name in named if _FILE.fullmatch(name)]
+    return [(time, folder / name) for time, name in named if field_files.NAME.fullmatch(name)]
 
 
 def packed(entries: list[tuple[float, Path]],
@@ -68,28 +66,24 @@ def packed(entries: list[tuple[float, Path]],
     last = field_files.read(entries[-1][1])
     chosen = _chosen(entries, dict(before or []), _as_drawn(last), MOST_BYTES - spent)
     grids = [_as_drawn(field_files.read(path)) for _, path, _ in chosen]
-    units = _units(grids)
+    arrays = [grid.point_data | grid.cell_data for grid in grids]
+    units = {name: names.readable_unit(name, [each[name] for each in arrays if name in each])
+             for name in FIELDS if any(name in each for each in arrays)}
     low = np.min([grid.points.min(0) for grid in grids], 0)
     high = np.max([grid.points.max(0) for grid in grids], 0)
     meshes: dict[bytes, dict] = {}
     frames = [_frame(time, grid, low[:2], high[:2], meshes, units)
               | ({"note": note} if note else {}) for (time, _, note), grid in zip(chosen, grids)]
-    described = [_described(name, grids[0], units[name][0])
-                 for name in FIELDS if _in_any(frames, name)]
+    described = []
+    for name, (unit, _) in units.items():
+        at_nodes = grids[0].point_data.get(name)
+        vector = at_nodes is not None and at_nodes.ndim == 2
+        words = names.words(name) + " (magnitude)" * vector
+        described.append({"name": name, "label": words[0].upper() + words[1:], "unit": unit,
+                          "at": "cell" if at_nodes is None else "node",
+                          "body": name in OF_AGGREGATE})
     return {"box": [low[0], high[0], low[1], high[1]], "of": len(entries), "frames": frames,
             "nodes": len(last.points), "meshes": list(meshes.values()), "fields": described}
-
-
-def _units(grids: list[Grid]) -> dict[str, tuple[str, float]]:
-    """Symbol and factor of the unit in which each field is shown, the same in all frames."""
-    arrays = [grid.point_data | grid.cell_data for grid in grids]
-    return {name: names.readable_unit(name, [each[name] for each in arrays if name in each])
-            for name in FIELDS}
-
-
-def _in_any(frames: list[dict], name: str) -> bool:
-    """Does any frame have values of this field?"""
-    return any(name in frame["values"] for frame in frames)
 
 
 def _chosen(entries: list[tuple[float, Path]], before: dict[float, Path], grid: Grid,
@@ -137,13 +131,6 @@ def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.column_stack([x.ravel(), y.ravel()]), (corner[:, None, None] + halves).reshape(-1, 3)
 
 
-def _described(name: str, grid: Grid, unit: str) -> dict:
-    vector = name in grid.point_data and grid.point_data[name].ndim == 2
-    words = names.words(name) + (" (magnitude)" if vector else "")
-    return {"name": name, "label": words[0].upper() + words[1:], "unit": unit,
-            "at": "node" if name in grid.point_data else "cell", "body": name in OF_AGGREGATE}
-
-
 def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict],
            units: dict[str, tuple[str, float]]) -> dict:
     cells = grid.cells
@@ -160,14 +147,14 @@ def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict],
 
 def _values(grid: Grid, region: np.ndarray,
             units: dict[str, tuple[str, float]]) -> dict[str, list]:
-    """The values of FIELDS in their units; fields of the aggregate only in its triangles
+    """The values of fields in their units; fields of the aggregate only in its triangles
     (`region`)."""
     nodes = np.unique(grid.cells[region])
     cells = np.flatnonzero(region)
     arrays = grid.point_data | grid.cell_data
     values = {}
-    for name in (name for name in FIELDS if name in arrays):
-        value = np.linalg.norm(arrays[name], axis=1) if arrays[name].ndim == 2 else arrays[name]
+    for name in (name for name in units if name in arrays):
+        value = magnitude(arrays[name])
         if name in OF_AGGREGATE:
             value = value[nodes if name in grid.point_data else cells]
         values[name] = _levels(units[name][1] * value)
@@ -176,13 +163,11 @@ def _values(grid: Grid, region: np.ndarray,
 
 def _levels(values: np.ndarray) -> list:
     """[least, largest, base64 of the values in LEVELS steps between them]."""
-    finite = values[np.isfinite(values)]
-    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    is_finite = np.isfinite(values)
+    finite = values[is_finite] if is_finite.any() else np.zeros(1)
+    low, high = float(finite.min()), float(finite.max())
     steps = np.full(len(values), LEVELS + 1.0)
-    if high > low:
-        steps[np.isfinite(values)] = np.round((finite - low) / (high - low) * LEVELS)
-    else:
-        steps[np.isfinite(values)] = 0.0
+    steps[is_finite] = np.round((values[is_finite] - low) / (high - low or 1.0) * LEVELS)
     return [low, high, _text(steps, "<u2")]
 
 

@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from html import escape
 from importlib import resources
 
@@ -14,24 +15,19 @@ def page(title: str, body: str, scripts: Sequence[str] = (), style: str = "page.
          rules: str = "") -> str:
     """A page with these scripts and this style of the package, and with further rules of style.
 
-    The browser runs only scripts whose hash is in the policy.
+    The browser runs only scripts whose hash is in the policy, and loads no other file.
     """
     rules = _content(style) + rules
     code = list(map(_content, scripts))
     run = "".join(f"<script>{text}</script>\n" for text in code)
+    permitted = " ".join(map(_hash, code)) or "'none'"
+    policy = (f"default-src 'none'; style-src {_hash(rules)}; script-src {permitted}; "
+              "base-uri 'none'; form-action 'none'")
     return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-            f'<meta http-equiv="Content-Security-Policy" content="{_policy(rules, code)}">\n'
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
             f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
             f"<title>{escape(title)}</title>\n<style>{rules}</style>\n</head>\n<body>\n"
             f'<pre id="errors" class="errors" hidden></pre>\n{body}\n{run}</body>\n</html>\n')
-
-
-def _policy(style: str, code: Sequence[str]) -> str:
-    """The content security policy of a page that has this style and these scripts, and loads no
-    other file."""
-    scripts = " ".join(map(_hash, code)) or "'none'"
-    return (f"default-src 'none'; style-src {_hash(style)}; script-src {scripts}; base-uri 'none'; "
-            "form-action 'none'")
 
 
 def _content(name: str) -> str:
@@ -56,24 +52,17 @@ def section(title: str, *parts: str) -> str:
 
 def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A table; every column after the first has values. Empty without rows."""
-    rows = list(rows)
-    if not rows:
-        return ""
-    heads = "".join(f'<th scope="col"{_value(k)}>{escape(text)}</th>'
-                    for k, text in enumerate(head))
-    body = "".join(map(_row, rows))
+    def cells(tag: str, values: Sequence[object]) -> str:
+        classes = ["", *[' class="value"'] * len(values)]
+        name = tag.partition(" ")[0]
+        return "".join(f"<{tag}{kind}>{escape(str(value))}</{name}>"
+                       for kind, value in zip(classes, values))
+
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    heads = cells('th scope="col"', head)
     top = f"<thead><tr>{heads}</tr></thead>" if head else ""
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
-    return f'<div class="scroll"><table>{title}{top}<tbody>{body}</tbody></table></div>'
-
-
-def _row(values: Sequence[object]) -> str:
-    cells = "".join(f"<td{_value(k)}>{escape(str(value))}</td>" for k, value in enumerate(values))
-    return f"<tr>{cells}</tr>"
-
-
-def _value(column: int) -> str:
-    return ' class="value"' if column else ""
+    return body and f'<div class="scroll"><table>{title}{top}<tbody>{body}</tbody></table></div>'
 
 
 def flat(tables: object, key: str = "") -> dict[str, object]:
@@ -97,14 +86,6 @@ def format_value(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(map(format_value, value)) or "none"
     number, _, unit = str(value).partition(" ")
-    if unit and isinstance(value, str) and _six_digits(number):
-        return f"{_six_digits(number)} {unit}"
+    with suppress(ValueError):  # it is no number
+        return f"{float(number):.6g} {unit}" if unit else str(value)
     return str(value)
-
-
-def _six_digits(text: str) -> str:
-    """Format a number in a text with six digits; empty if it is not a number."""
-    try:
-        return f"{float(text):.6g}"
-    except ValueError:
-        return ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -71,26 +70,14 @@ def mean_rates(start: np.ndarray, end: np.ndarray, amounts: np.ndarray) -> TimeS
     return np.column_stack([start, end]).ravel(), np.repeat(rates, 2)
 
 
-def _rate(name: str, part: str) -> Quantity:
-    """Divide a part of a substrate's ledger by the length of the step."""
-    column = f"{name}_{part}_pg_per_m"
-
-    def value(run: Run) -> TimeSeries:
-        return mean_rates(run.ledger["start_h"], run.ledger["end_h"], run.ledger[column])
-
-    return Quantity(f"{name}_{part}_ug_per_m_per_h", f"{name} {PARTS[part][0]} in an hour",
-                    f"{column} / (end_h - start_h), from the start to the end of the step", value,
-                    PARTS[part][0], signed=True)
-
-
-def _remeshed_nodes(run: Run) -> TimeSeries:
-    is_new_mesh = run.series.get("remeshed", run.times * np.nan) == 1
-    return run.times, np.where(is_new_mesh, run.series.get("nodes", np.nan), np.nan)
-
-
 #: Quantities besides the columns of the time series; ``value`` maps a run to a TimeSeries.
 DERIVED = (
-    *(_rate(name, part) for name in SUBSTRATES for part in PARTS),
+    *(Quantity(f"{name}_{part}_ug_per_m_per_h", f"{name} {label} in an hour",
+               f"{name}_{part}_pg_per_m / (end_h - start_h), from the start to the end of the step",
+               lambda run, column=f"{name}_{part}_pg_per_m": mean_rates(
+                   run.ledger["start_h"], run.ledger["end_h"], run.ledger[column]),
+               label, signed=True)
+      for name in SUBSTRATES for part, (label, _) in PARTS.items()),
     Quantity("biomass_held_ug_per_m", "biomass of the aggregate",
              "biomass_after_pg_per_m, at the step's end",
              lambda run: (run.ledger["end_h"], run.ledger["biomass_after_pg_per_m"]),
@@ -100,25 +87,16 @@ DERIVED = (
              lambda run: (run.ledger["end_h"], np.cumsum(run.ledger["biomass_made_pg_per_m"])),
              "made since t = 0", signed=True),
     Quantity("remeshed_nodes", "nodes of a new mesh", "nodes, where remeshed is 1",
-             _remeshed_nodes, "new mesh"),
+             lambda run: (run.times, np.where(run.series.get("remeshed", run.times * 0) == 1,
+                                              run.series.get("nodes", np.nan), np.nan)),
+             "new mesh"),
 )
-KNOWN = names.KNOWN | {each.name: each for each in DERIVED}
-
-
-def _label(name: str) -> str:
-    """Return the label of a column or a derived quantity."""
-    return KNOWN[name].label if name in KNOWN else names.label(name)
+DERIVED_BY_NAME = {each.name: each for each in DERIVED}
 
 
 def _pair(pattern: str) -> tuple[str, ...]:
     """Return the names of a quantity of both substrates, by a pattern."""
     return tuple(pattern.format(name) for name in SUBSTRATES)
-
-
-def _ledger(name: str) -> Kind:
-    """Make the chart of the rates in the ledger of a substrate."""
-    return Kind(f"Ledger: {name}", "rate",
-                tuple(f"{name}_{part}_ug_per_m_per_h" for part in PARTS))
 
 
 KINDS = (
@@ -139,7 +117,8 @@ KINDS = (
          ("fluid_force_x_uN_per_m", "fluid_force_y_uN_per_m")),
     Kind("Uptake and growth", "rate",
          (*_pair("{}_uptake_ug_per_m_per_h"), "biomass_growth_ug_per_m_per_h")),
-    *map(_ledger, SUBSTRATES),
+    *(Kind(f"Ledger: {name}", "rate", tuple(f"{name}_{part}_ug_per_m_per_h" for part in PARTS))
+      for name in SUBSTRATES),
     Kind("Ledger: biomass", "biomass", ("biomass_held_ug_per_m", "biomass_made_ug_per_m")),
     Kind("Defects of the balances", "relative defect",
          (*_pair("{}_balance"), "biomass_balance", "oxygen_demand_balance"), True),
@@ -148,16 +127,14 @@ KINDS = (
 
 
 def kinds(drawable: Iterable[str]) -> list[Kind]:
-    """Return the charts of columns: ``KINDS``, and those that compare aggregates."""
-    of_bodies = map(partial(_of_bodies, list(drawable)), BODY)
+    """Return the charts of columns: ``KINDS``, and those that compare aggregates.
+
+    A quantity of each aggregate has a chart unless it is a coordinate.
+    """
+    of_bodies = [Kind(f"Each aggregate: {quantity.words}", quantity.label,
+                      tuple(name for name in drawable if names.label_in(name, quantity)))
+                 for quantity in BODY if not quantity.name.endswith(names.COORDINATES)]
     return [*KINDS, *(kind for kind in of_bodies if kind.drawn)]
-
-
-def _of_bodies(drawable: Sequence[str], quantity: Quantity) -> Kind:
-    """Make the chart of a quantity of each aggregate; empty for a coordinate."""
-    drawn = () if quantity.name.endswith(names.COORDINATES) else tuple(
-        name for name in drawable if names.label_in(name, quantity))
-    return Kind(f"Each aggregate: {quantity.words}", quantity.label, drawn)
 
 
 def series(run: Run) -> dict[str, TimeSeries]:
@@ -165,13 +142,10 @@ def series(run: Run) -> dict[str, TimeSeries]:
 
     Quantities that the run does not model are left out, and so is zero storage.
     """
-    drawable: dict[str, TimeSeries] = {}
-    tables = run.record["tables"]
-    drawable |= {name: with_jumps(name, run.times, values, tables)
-                 for name, values in run.series.items()}
-    steps = len(run.ledger["end_h"]) if run.ledger else 0
+    drawable = {name: with_jumps(name, run.times, values, run.record["tables"])
+                for name, values in run.series.items()}
     for quantity in DERIVED:
-        if steps or quantity.name == "remeshed_nodes":
+        if len(run.ledger.get("end_h", ())) or quantity.name == "remeshed_nodes":
             times, values = quantity.value(run)
             drawable[quantity.name] = times, quantity.unit.factor * values
     return {name: (times, values) for name, (times, values) in drawable.items()
@@ -181,11 +155,16 @@ def series(run: Run) -> dict[str, TimeSeries]:
 def charts_of(run: Run) -> list[Chart]:
     """Make the charts of one run; none for a single row.
 
-    A chart needs a quantity that changes. A quantity that is zero throughout is not drawn.
+    A chart needs a quantity that changes. A quantity that is zero throughout is not drawn. A chart
+    with one of several lines has its label in the title.
     """
-    marks = contact(run)
-    return [kind.chart(_title(kind, lines), [*lines.values()], marks)
-            for kind, lines in _split(run, constant=False)]
+    drawn = []
+    for kind, lines in _split(run, constant=False):
+        one_of_several = len(lines) == 1 < len(kind.drawn)
+        (first, *_) = lines.values()
+        title = f"{kind.title}: {first.label}" if one_of_several else kind.title
+        drawn.append(kind.chart(title, [*lines.values()], contact(run)))
+    return drawn
 
 
 def constants_of(run: Run) -> list[str]:
@@ -193,54 +172,51 @@ def constants_of(run: Run) -> list[str]:
 
     A text is "words: value unit".
     """
-    return [_constant(name, line) for _, lines in _split(run, constant=True)
-            for name, line in lines.items()]
+    texts = []
+    for _, lines in _split(run, constant=True):
+        for name, line in lines.items():
+            symbol, factor = names.readable_unit(name, [line.values])
+            value = factor * line.values[np.isfinite(line.values)][0]
+            texts.append(f"{_named(name).words}: {number(value)} {symbol}".rstrip())
+    return texts
 
 
 def _split(run: Run, constant: bool) -> list[tuple[Kind, dict[str, Line]]]:
     """Return the lines of each kind that are drawn, or those that are texts; kinds with any.
 
-    Lines without a finite value are neither.
+    A line is a text if it is zero throughout, or if no line of its chart changes. Lines without a
+    finite value are neither.
     """
     drawable = series(run) if len(run.times) > 1 else {}
     split = []
     for kind in kinds(drawable):
-        lines = {name: _line(_label(name), name, drawable) for name in kind.drawn
+        lines = {name: _line(_named(name).label, name, drawable) for name in kind.drawn
                  if name in drawable}
         changing = any(not line.constant and not line.dots for line in lines.values())
-        chosen = {name: line for name, line in lines.items()
-                  if _is_text(line, changing) == constant and not (constant and line.dots)}
+        chosen = {}
+        for name, line in lines.items():
+            is_zero = line.constant and not np.nan_to_num(line.values).any()
+            if (not changing or is_zero) == constant and not (constant and line.dots):
+                chosen[name] = line
         split += [(kind, chosen)] if chosen else []
     return split
 
 
-def _is_text(line: Line, changing: bool) -> bool:
-    """Whether a line is zero throughout, or no line of its chart changes."""
-    return not changing or (line.constant and not np.nan_to_num(line.values).any())
-
-
-def _title(kind: Kind, lines: dict[str, Line]) -> str:
-    """Return the title of a chart, with the label of its only line among several."""
-    (first, *others) = lines.values()
-    return kind.title if others or len(kind.drawn) == 1 else f"{kind.title}: {first.label}"
-
-
-def _constant(name: str, line: Line) -> str:
-    symbol, factor = names.readable_unit(name, [line.values])
-    value = factor * line.values[np.isfinite(line.values)][0]
-    known = KNOWN.get(name)
-    return f"{known.words if known else names.words(name)}: {number(value)} {symbol}".rstrip()
+def _named(name: str) -> Quantity:
+    """Return the quantity of a name; an unknown name is its own words."""
+    return (DERIVED_BY_NAME.get(name) or names.known(name)
+            or Quantity(name, names.words(name), "", None, names.words(name)))
 
 
 def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
     """Make a chart for each quantity, with one line for each run."""
     by_run, overlays = [series(run) if len(run.times) > 1 else {} for run in runs], []
-    for kind in kinds(dict.fromkeys(name for drawable in by_run for name in drawable)):
-        for name in kind.drawn:
-            lines = [_line(label, name, drawable) for label, drawable in zip(labels, by_run)]
-            title = kind.title if len(kind.drawn) == 1 else f"{kind.title}: {_label(name)}"
-            if any(name in drawable for drawable in by_run):
-                overlays.append(kind.chart(title, lines))
+    drawable = dict.fromkeys(name for each in by_run for name in each)
+    for kind in kinds(drawable):
+        for name in (name for name in kind.drawn if name in drawable):
+            lines = [_line(label, name, each) for label, each in zip(labels, by_run)]
+            more = f": {_named(name).label}" if len(kind.drawn) > 1 else ""
+            overlays.append(kind.chart(kind.title + more, lines))
     return overlays
 
 

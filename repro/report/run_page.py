@@ -60,22 +60,26 @@ font-family="system-ui, sans-serif"></svg></div>\
 def build(run: Run) -> str:
     """The text of the page. Raises OutputError if a file of fields cannot be read."""
     drawn = _charts(run)
-    packed = _packed(run, len(drawn))
-    body = (_head(run) + _fields(run, packed) + drawn
-            + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run)
-            + _provenance(run))
-    more = page.data("fields", packed) if packed else ""
-    scripts = ["errors.js", "charts.js", *(["mesh.js", "fields.js"] if packed else [])]
-    return page.page(f"{run.record['scene']}: a pore", body + more, scripts)
-
-
-def _packed(run: Run, spent: int) -> dict:
     before = []
     if "before_expansion.pvd" in run.record["files"]:
         before = fields.index(run.folder, "before_expansion.pvd")
-    packed = fields.packed(fields.index(run.folder), before, spent)
-    start = _first_shown(packed, quantities.contact(run)) if packed else {}
-    return packed | {"start": start, "colours": viridis(BANDS)} if packed else {}
+    packed = fields.packed(fields.index(run.folder), before, len(drawn))
+    more = ""
+    if packed:
+        start = _first_shown(packed, quantities.contact(run))
+        more = page.data("fields", packed | {"start": start, "colours": viridis(BANDS)})
+    tables = run.record["tables"]
+    missing = [name for name in PHYSICS if name not in tables]
+    note = f'<p class="note">Not modelled: {", ".join(missing)}.</p>' if missing else ""
+    scene = "".join(page.table(f"[{name}]", [], _pairs(part)) for name, part in tables.items())
+    if scene:
+        scene = ("<details><summary>The scene, every key</summary>"
+                 f'<div class="tables">{scene}</div></details>')
+    body = (_head(run) + _fields(run, packed) + drawn
+            + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>'
+            + page.section("What was modelled", note, scene) + _provenance(run))
+    scripts = ["errors.js", "charts.js", *(["mesh.js", "fields.js"] if packed else [])]
+    return page.page(f"{run.record['scene']}: a pore", body + more, scripts)
 
 
 def _first_shown(packed: dict, contact: list[float]) -> dict[str, str | int]:
@@ -92,28 +96,16 @@ def _first_shown(packed: dict, contact: list[float]) -> dict[str, str | int]:
 def _head(run: Run) -> str:
     status = run.record["status"]
     stopped = "" if status == "completed" else " stopped"
-    modelled = [words for name, words in PHYSICS.items() if name in run.record["tables"]]
+    items = "".join(f"<li>Warning: <b>{html.escape(warning['key'])}</b>: "
+                    f"{html.escape(warning['text'])}</li>" for warning in run.record["warnings"])
+    warnings = f'<ul class="warnings" aria-label="warnings">{items}</ul>' if items else ""
+    modelled = "; ".join(words for name, words in PHYSICS.items() if name in run.record["tables"])
     return (f"<header><h1>{html.escape(run.record['scene'])}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>'
             f"{answer.build(run)}"
-            f"{_warnings(run)}"
-            f"<p>{html.escape(_sentence(modelled))} {html.escape(_assumed(run))} "
-            f"{html.escape(_numerics(run))}</p></header>\n")
-
-
-def _warnings(run: Run) -> str:
-    """The list of the warnings of a run; empty without any."""
-    items = "".join(map(_warning, run.record["warnings"]))
-    return f'<ul class="warnings" aria-label="warnings">{items}</ul>' if items else ""
-
-
-def _warning(warning: dict[str, str]) -> str:
-    """A warning, with the key of the scene and a text, as an item of a list."""
-    return f"<li>Warning: <b>{html.escape(warning['key'])}</b>: {html.escape(warning['text'])}</li>"
-
-
-def _sentence(parts: list[str]) -> str:
-    return f"Modelled: {'; '.join(parts)}." if parts else "Modelled: the geometry and its mesh."
+            f"{warnings}"
+            f"<p>Modelled: {html.escape(modelled or 'the geometry and its mesh')}. "
+            f"{html.escape(_assumed(run))} {html.escape(_numerics(run))}</p></header>\n")
 
 
 def _assumed(run: Run) -> str:
@@ -157,28 +149,18 @@ def _field_note(packed: dict) -> str:
     if packed["nodes"] > fields.MOST_NODES:
         note = f"A mesh of {packed['nodes']} nodes, shown on a regular grid of triangles"
     unexpanded = sum("note" in frame for frame in packed["frames"])
-    note += (f"; {_times_note(len(packed['frames']) - unexpanded, packed['of'])}"
-             f"{', those grown and not yet expanded besides' if unexpanded else ''}. Values are "
-             "rounded to 1/65534 of their range; the .vtu files have every time and digit.")
-    note += (" Colours span the values that are shown, on a logarithmic scale from a factor of 100 "
-             f"on, over four decades at most. Grey{_grey(packed)}.")
-    return note + (" Point at the picture for a value, or focus it and press the arrow keys."
-                   + (" Arrow keys also move the slider." if packed["of"] > 1 else ""))
-
-
-def _grey(packed: dict) -> str:
-    """The areas without a value in words."""
-    areas = " is the part of the pore that is not meshed at that time"
-    if any(field["body"] for field in packed["fields"]):
-        areas += ", and the fluid where a field exists in the aggregate alone"
-    return areas
-
-
-def _times_note(count: int, total: int) -> str:
-    """The number of times whose fields are in the page."""
-    if count < total:
-        return f"{count} of {total} times shown"
-    return f"all {total} times shown" if total > 1 else "one time"
+    count, total = len(packed["frames"]) - unexpanded, packed["of"]
+    times = f"all {total} times shown" if total > 1 else "one time"
+    times = f"{count} of {total} times shown" if count < total else times
+    besides = ", those grown and not yet expanded besides" if unexpanded else ""
+    in_bodies = any(field["body"] for field in packed["fields"])
+    fluid = ", and the fluid where a field exists in the aggregate alone" if in_bodies else ""
+    slider = " Arrow keys also move the slider." if total > 1 else ""
+    return (f"{note}; {times}{besides}. Values are rounded to 1/65534 of their range; the .vtu "
+            "files have every time and digit. Colours span the values that are shown, on a "
+            "logarithmic scale from a factor of 100 on, over four decades at most. Grey is the "
+            f"part of the pore that is not meshed at that time{fluid}. Point at the picture for a "
+            f"value, or focus it and press the arrow keys.{slider}")
 
 
 def _charts(run: Run) -> str:
@@ -186,28 +168,21 @@ def _charts(run: Run) -> str:
     drawn = quantities.charts_of(run)
     if not drawn:
         return ""
-    constant = quantities.constants_of(run)
-    of_pore, of_mesh = ([chart for chart in drawn if chart.of_mesh == apart]
-                        for apart in (False, True))
-    listed = f"<p>Constant: {html.escape('; '.join(constant))}.</p>" if constant else ""
-    return (page.section("Over time", _charts_note(run), listed, _figures(of_pore))
-            + page.section("Of the mesh and the balances, not of the pore", _figures(of_mesh)))
-
-
-def _figures(drawn: list[charts.Chart]) -> str:
-    """Charts side by side; empty without any."""
-    figures = "".join(map(charts.svg, drawn))
-    return f'<div class="charts">{figures}</div>' if figures else ""
-
-
-def _charts_note(run: Run) -> str:
     note = ("Point at a chart for its values, or focus it and press the arrow keys; a click or "
             "Enter shows the fields of that time.")
     if touching := quantities.contact(run):
         note += f" Dotted: contact with the opposite wall, t = {touching[0]:.6g} h."
     if len(run.times) > charts.MOST_POINTS:
         note += f" {charts.MOST_POINTS} of {len(run.times)} rows are drawn."
-    return f'<p class="note">{note}</p>'
+    constant = quantities.constants_of(run)
+    listed = f"<p>Constant: {html.escape('; '.join(constant))}.</p>" if constant else ""
+    figures = {True: "", False: ""}
+    for chart in drawn:
+        figures[chart.of_mesh] += charts.svg(chart)
+    of_pore, of_mesh = (figures[kind] and f'<div class="charts">{figures[kind]}</div>'
+                        for kind in (False, True))
+    return (page.section("Over time", f'<p class="note">{note}</p>', listed, of_pore)
+            + page.section("Of the mesh and the balances, not of the pore", of_mesh))
 
 
 def _numbers(run: Run) -> str:
@@ -215,30 +190,17 @@ def _numbers(run: Run) -> str:
     if not len(run.times):
         return page.section("Numbers", "<p>The run has no row: it stopped before the first.</p>")
     ends = [0, -1] if len(run.times) > 1 else [0]
+    rows = []
+    for name, series in run.series.items():
+        values = series[ends]
+        if name in names.YES_NO and np.isfinite(values).all():
+            rows.append([names.words(name), *map(page.format_value, (values == 1).tolist())])
+        elif name != "time_h" and np.isfinite(values).all():
+            symbol, factor = names.readable_unit(name, [values])
+            rows.append([names.with_unit(name, symbol),
+                         *map(charts.number, (factor * values).tolist())])
     head = ["", *(f"t = {time:.6g} h" for time in run.times[ends])]
-    rows = [_number_row(name, values[ends]) for name, values in run.series.items()
-            if name != "time_h" and np.isfinite(values[ends]).all()]
     return page.section("Numbers", page.table("", head, rows))
-
-
-def _number_row(name: str, values: np.ndarray) -> tuple[str, ...]:
-    """The words of a column with a unit, and its values in this unit."""
-    if name in names.YES_NO:
-        return names.words(name), *(page.format_value(value == 1) for value in values.tolist())
-    symbol, factor = names.readable_unit(name, [values])
-    return names.with_unit(name, symbol), *map(charts.number, (factor * values).tolist())
-
-
-def _modelled(run: Run) -> str:
-    """The scene with a table for each section."""
-    tables = run.record["tables"]
-    missing = [name for name in PHYSICS if name not in tables]
-    note = f'<p class="note">Not modelled: {", ".join(missing)}.</p>' if missing else ""
-    tables_html = "".join(page.table(f"[{name}]", [], _pairs(part))
-                          for name, part in tables.items())
-    scene = ("<details><summary>The scene, every key</summary>"
-             f'<div class="tables">{tables_html}</div></details>')
-    return page.section("What was modelled", note, scene if tables_html else "")
 
 
 def _pairs(part: object) -> list[tuple[str, str]]:
@@ -260,20 +222,15 @@ def _cost(run: Run) -> str:
 def _bars(stages: dict, total: float) -> str:
     """Seconds by stage, the longest first; the lengths are parts of the total. Empty without any.
     """
-    positive = [(name, value) for name, value in stages.items() if value > 0]
-    if not positive:
-        return ""
-    positive.sort(key=lambda entry: -entry[1])
-    rows = "".join(_bar(22 * k, name, value, 150 * min(1.0, value / total))
-                   for k, (name, value) in enumerate(positive))
-    return (f'<svg class="bars" viewBox="0 0 340 {22 * len(positive) + 4}" role="img" '
-            f'aria-label="seconds by stage">{rows}</svg><p class="note">{NESTED}</p>')
-
-
-def _bar(top: float, name: str, seconds: float, width: float) -> str:
-    return (f'<text x="0" y="{top + 15}">{html.escape(name)}</text>'
-            f'<rect x="135" y="{top + 4}" width="{width:.1f}" height="14"/>'
-            f'<text x="{140 + width:.1f}" y="{top + 15}">{seconds:.3g} s</text>')
+    positive = sorted((-value, name) for name, value in stages.items() if value > 0)
+    rows = ""
+    for k, (negative, name) in enumerate(positive):
+        top, width = 22 * k, 150 * min(1.0, -negative / total)
+        rows += (f'<text x="0" y="{top + 15}">{html.escape(name)}</text>'
+                 f'<rect x="135" y="{top + 4}" width="{width:.1f}" height="14"/>'
+                 f'<text x="{140 + width:.1f}" y="{top + 15}">{-negative:.3g} s</text>')
+    return rows and (f'<svg class="bars" viewBox="0 0 340 {22 * len(positive) + 4}" role="img" '
+                     f'aria-label="seconds by stage">{rows}</svg><p class="note">{NESTED}</p>')
 
 
 def _provenance(run: Run) -> str:

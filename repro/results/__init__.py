@@ -7,7 +7,6 @@
     tables        results in Python
     permeability  laws for models on the Darcy scale
     drawing       curves, fields and films with matplotlib
-    netcdf        results as NetCDF, by `Results.to_netcdf`
 
 Writers use :func:`repro.results.files.atomic_path`, so that a file is complete or absent. An empty
 field of a table is a quantity that the scene does not model.
@@ -19,6 +18,7 @@ import csv
 import io
 import json
 import platform
+from collections.abc import Iterable
 from dataclasses import asdict
 from functools import cache
 from importlib import metadata
@@ -64,21 +64,11 @@ def write_index(path: Path, entries: list[tuple[float, str]]) -> None:
     write_text(path, f'<?xml version="1.0"?>\n{content}\n')
 
 
-def write_table(path: Path, columns: list[str], rows: list[list]) -> None:
+def write_table(path: Path, columns: list[str], rows: Iterable[Iterable]) -> None:
     """Write a CSV table; None is an empty field, floats keep every digit."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    for line in rows:
-        writer.writerow([_csv_value(value) for value in line])
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
     write_text(path, text.getvalue())
-
-
-def _csv_value(value: object) -> object:
-    """A value in the form of a CSV file."""
-    if value is None:
-        return ""
-    return repr(float(value)) if isinstance(value, float) else value
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
@@ -96,14 +86,9 @@ def parse_table(content: bytes) -> dict[str, np.ndarray]:
     if not text.endswith("\n"):
         raise ValueError("it is empty, or its last line is cut short")
     head, *rows = csv.reader(io.StringIO(text))
-    numbers = [list(map(_number, row)) for row in rows]
+    numbers = [[float(field or "nan") for field in row] for row in rows]
     columns = np.array(numbers, dtype=float).reshape(len(rows), len(head)).T
     return dict(zip(head, np.ascontiguousarray(columns)))
-
-
-def _number(field: str) -> float:
-    """The number in a field; an empty field is not-a-number."""
-    return float(field or "nan")
 
 
 def provenance(scene: Scene) -> dict:

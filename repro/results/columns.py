@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import Any
 
 from repro.fem.walls import BOTTOM, TOP, numbered
 from repro.march import balance
@@ -16,30 +15,29 @@ from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.surface import BESIDE, STRETCH, least_stretched, surfaces
 from repro.model.transport_in_time import transport_in_time
 from repro.results.quantities import Quantity, is_modelled
-from repro.scene import Growth, Scene
-
-if TYPE_CHECKING:
-    from repro.model.adhesion import Loading
+from repro.scene import Scene
 
 SUBSTRATES = ("acceptor", "donor")
+
+
+def _solved(name: str, scene: Scene, at: Report) -> bool:
+    return getattr(at.solved.concentrations, name, None) is not None
+
+
 #: Parts that a quantity may need: does a report have them?
 NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
-    "acceptor": lambda scene, at: _solved("acceptor", at),
-    "donor": lambda scene, at: _solved("donor", at),
+    **{name: partial(_solved, name) for name in SUBSTRATES},
     "seed": lambda scene, at: bool(scene.aggregates or at.pore.bodies),
     "aggregate": lambda scene, at: bool(at.pore.bodies),
     "biomass": lambda scene, at: bool(at.pore.bodies) and scene.kinetics is not None,
     "substrates": lambda scene, at: at.solved.concentrations is not None,
     "growth": lambda scene, at: NEEDS["seed"](scene, at) and scene.growth is not None,
-    "adhesion": lambda scene, at: (scene.growth is not None and bool(at.pore.bodies)
-                                   and at.pore.accumulates and _has_adhesion(scene.growth))}
-
-
-def _has_adhesion(growth: Growth) -> bool:
-    """Does a scene ask for the columns of adhesion?"""
-    return (growth.bonded or growth.has_fluid_forces
-            or growth.bonding_strength is not None or growth.tensile_strength is not None)
+    "adhesion": lambda scene, at: (
+        scene.growth is not None and bool(at.pore.bodies) and at.pore.accumulates
+        and (scene.growth.bonded or scene.growth.has_fluid_forces
+             or scene.growth.bonding_strength is not None
+             or scene.growth.tensile_strength is not None))}
 
 
 def _both(pattern: str, words: str, formula: str, value: Callable,
@@ -47,10 +45,6 @@ def _both(pattern: str, words: str, formula: str, value: Callable,
     """A quantity for each of acceptor and donor, whose names replace {} in the texts."""
     return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
                      name, signed=signed) for k, name in enumerate(SUBSTRATES)]
-
-
-def _solved(name: str, at: Report) -> bool:
-    return getattr(at.solved.concentrations, name, None) is not None
 
 
 def _least(k: int, scene: Scene, at: Report) -> float:
@@ -103,14 +97,10 @@ def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> li
                        f"{axis} of {label}", "adhesion", signed=axis == "x") for axis in "xy")]
 
 
-def _adhesion() -> ModuleType:
-    """Import the stresses of an aggregate, which a scene without growth does not load."""
+def _adhesion(part: str, scene: Scene, at: Report) -> Any:
+    """Call a function of the stresses of aggregates, which a scene without growth does not load."""
     from repro.model import adhesion
-    return adhesion
-
-
-def _loading(scene: Scene) -> Loading:
-    return _adhesion().Loading.of(scene)
+    return getattr(adhesion, part)(adhesion.Loading.of(scene), at.pore, at.solved)
 
 
 def _all(value: Callable[[int, Scene, Report], float],
@@ -124,7 +114,7 @@ def _of_outline(part: str, k: int, scene: Scene, at: Report) -> float:
 
 
 def _load(part: str, k: int, scene: Scene, at: Report) -> float:
-    return getattr(_adhesion().fluid_loads(_loading(scene), at.pore, at.solved)[k], part)
+    return getattr(_adhesion("fluid_loads", scene, at)[k], part)
 
 
 def _uptake(substrate: int, k: int, scene: Scene, at: Report) -> float:
@@ -235,11 +225,11 @@ SERIES = (
     *_peak("wall_traction_max", "largest traction that a wall must bear",
            "largest (max(pull, 0)^2 + shear^2)^(1/2), means over W / 20 along the contact surface",
            "wall traction",
-           lambda scene, at: _adhesion().wall_peak(_loading(scene), at.pore, at.solved)),
+           partial(_adhesion, "wall_peak")),
     *_peak("tensile_stress_max", "largest tensile stress of the aggregate",
            "largest eigenvalue of the Cauchy stress, in a mean around a node with the weight 1 - "
            "(d / L)^2 at a distance d < L = W / 20", "tensile stress",
-           lambda scene, at: _adhesion().tensile_peak(_loading(scene), at.pore, at.solved)),
+           partial(_adhesion, "tensile_peak")),
     *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
                "integral of the water's stress over the interface, or of its drag over a permeable "
                "aggregate; the head is zero at the outlet of the meshed part",
@@ -323,10 +313,10 @@ BODY = (
              lambda k, scene, at: surfaces(at.pore)[k].least, "least stretch", "growth"),
     *_peak("aggregate_NAME_wall_traction_max", "largest traction that a wall must bear",
            "as wall_traction_max_MPa", "wall traction",
-           lambda k, scene, at: _adhesion().wall_peaks(_loading(scene), at.pore, at.solved)[k]),
+           lambda k, *of: _adhesion("wall_peaks", *of)[k]),
     *_peak("aggregate_NAME_tensile_stress_max", "largest tensile stress",
            "as tensile_stress_max_MPa", "tensile stress",
-           lambda k, scene, at: _adhesion().tensile_peaks(_loading(scene), at.pore, at.solved)[k]),
+           lambda k, *of: _adhesion("tensile_peaks", *of)[k]),
     *(Quantity(f"aggregate_NAME_fluid_force_{axis}_uN_per_m", f"force of the fluid, {axis}",
                f"as fluid_force_{axis}_uN_per_m", partial(_load, axis), f"force {axis}",
                "adhesion and flow", signed=True) for axis in "xy"),
@@ -334,17 +324,14 @@ BODY = (
 
 
 def of_body(quantity: Quantity, label: str) -> Quantity:
-    """A quantity of ``BODY`` for the aggregate with a name."""
-    return replace(quantity, name=quantity.name.replace("NAME", label),
+    """A quantity of ``BODY`` for the aggregate with a name; None if it is not in the pore."""
+    def value(scene: Scene, at: Report) -> float | None:
+        names = [body.name for body in at.pore.bodies]
+        return quantity.value(names.index(label), scene, at) if label in names else None
+
+    return replace(quantity, name=quantity.name.replace("NAME", label), value=value,
                    words=f"{quantity.words}, aggregate {label}",
-                   value=partial(_of_named, quantity.value, label),
                    label=f"{quantity.label}, {label}")
-
-
-def _of_named(value: Callable, name: str, scene: Scene, at: Report) -> float | None:
-    """A value of the aggregate with a name; None if it is not in the pore."""
-    names = [body.name for body in at.pore.bodies]
-    return value(names.index(name), scene, at) if name in names else None
 
 
 def series(scene: Scene) -> tuple[Quantity, ...]:

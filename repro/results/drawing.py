@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from repro.errors import printable
 from repro.results import names, outlines, quantities
 from repro.results.files import output_path
 from repro.results.jumps import with_jumps
+from repro.scene.needed import package
 from repro.scene.units import to_internal
 
 if TYPE_CHECKING:
@@ -29,6 +31,8 @@ PANELS: tuple[tuple[str, ...], ...] = (
 WIDTH, PANEL, ROOM = 7.0, 1.9, 1.2
 #: Time of a frame of a film, ms; resolution, dots per inch.
 FRAME, RESOLUTION = 120, 110
+#: Dots per inch of a picture in a notebook.
+SMALL = 80
 #: ffmpeg's filter for sides of an even number of pixels, which the format of colours needs.
 EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
 OUTLINE = "#d7191c"
@@ -76,14 +80,8 @@ class Style:
 PLAIN = Style()
 
 
-def optional(module: str) -> Any:
-    """Import a module of matplotlib or Pillow. Raises ImportError with the packages to install.
-    """
-    try:
-        return import_module(module)
-    except ImportError:
-        raise ImportError("the package matplotlib is not installed; "
-                          "pip install matplotlib pillow") from None
+#: Imports a module of matplotlib or Pillow. Raises ImportError with the packages to install.
+optional = partial(package, install="matplotlib pillow")
 
 
 def full_name(name: str, known: Sequence[str]) -> str:
@@ -96,7 +94,10 @@ def full_name(name: str, known: Sequence[str]) -> str:
 def curves(results: Results, drawn: Sequence[Sequence[str]], ax: Any = None,
            style: Style = PLAIN) -> list[Any]:
     """Draw columns over time, a panel for each tuple of names; returns the axes of the panels."""
-    axes = _panels(len(drawn)) if ax is None else list(np.ravel(ax))
+    if ax is None:
+        _, ax = optional(PYPLOT).subplots(len(drawn), sharex=True, layout="constrained",
+                                          figsize=(WIDTH, PANEL * len(drawn) + 0.8))
+    axes = list(np.ravel(ax))
     if len(axes) != len(drawn):
         raise ValueError(f"ax: {len(drawn)} axes are needed, not {len(axes)}")
     for panel, columns in zip(axes, drawn):
@@ -111,13 +112,6 @@ def _plain(text: str) -> str:
     return printable(text).replace("$", r"\$")
 
 
-def _panels(count: int) -> list[Any]:
-    size = (WIDTH, PANEL * count + 0.8)
-    _, axes = optional(PYPLOT).subplots(count, sharex=True, squeeze=False, figsize=size,
-                                        layout="constrained")
-    return list(axes[:, 0])
-
-
 def _draw_panel(ax: Any, results: Results, columns: Sequence[str], style: Style) -> None:
     """Draw columns in one unit, and the time of contact; a point if there is one row."""
     marker = "o" if len(results.time) == 1 else ""
@@ -129,21 +123,27 @@ def _draw_panel(ax: Any, results: Results, columns: Sequence[str], style: Style)
         ax.set_yscale("log")
     if marker:
         ax.set_xticks(results.time)
-    many = len(columns) > 1
-    ax.set_ylabel(f"{_common(columns)}\n({unit or '1'})")
+    several = len(columns) > 1
+    label = columns[0].partition("_")[0] if several else names.label(columns[0])
+    ax.set_ylabel(f"{label}\n({unit or '1'})")
     ax.grid(alpha=0.3)
     touching = results.time[results["contact"] == 1] if "contact" in results else []
     if len(touching):
         ax.axvline(touching[0], color="0.4", linestyle=":", label="contact with the wall")
-    if many or len(touching):
+    if several or len(touching):
         ax.legend(frameon=False, fontsize="small")
 
 
-def _common(columns: Sequence[str]) -> str:
-    """The label of a column, or the common part of the names of several columns."""
-    if len(columns) == 1:
-        return names.label(columns[0])
-    return columns[0].partition("_")[0]
+def _axes(ax: Any, size: tuple[float, float]) -> Any:
+    """The axes to draw in, by default those of a new figure of a size (inches)."""
+    return ax or optional(PYPLOT).subplots(figsize=size, layout="constrained")[1]
+
+
+def _add_lines(ax: Any, lines: Iterable[np.ndarray], **style: Any) -> Any:
+    """Draw lines, each of points (n, 2); returns their collection."""
+    collection = optional("matplotlib.collections").LineCollection(lines, linewidths=1.5, **style)
+    ax.add_collection(collection)
+    return collection
 
 
 def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = None,
@@ -151,20 +151,31 @@ def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = Non
           style: Style = PLAIN) -> Any:
     """Draw a field with the outline of the aggregate and a colour bar; returns the axes.
 
-    Vectors are drawn by their lengths. limits: values of the first and last colour; box: lower left
-    and upper right corner (um). By default, they fit the field.
+    Values at nodes are drawn smoothly, values in triangles as they are, and vectors by their
+    lengths; NaN stays empty. limits: values of the first and last colour; box: lower left and upper
+    right corner (um). By default, they fit the field.
     """
     unit, _ = style.unit_of(name)
     values = shown(fields, name, style)
     limits = value_range(values) if limits is None else limits
     box = corners(fields) if box is None else box
-    if ax is None:
-        _, ax = optional(PYPLOT).subplots(figsize=field_size(box), layout="constrained")
-    image = _image(ax, fields, values, style.cmap)
+    ax = _axes(ax, field_size(box))
+    cells = fields["triangles"]
+    parts = np.array(PARTS[cells.shape[1]])
+    triangles = cells[:, parts].reshape(-1, 3)
+    in_triangles = len(values) == len(cells)
+    colours = np.repeat(values, len(parts)) if in_triangles else values
+    missing = np.isnan(colours) if in_triangles else np.isnan(colours[triangles]).any(axis=1)
+    kind = {"facecolors": colours[~missing]} if in_triangles else {"shading": "gouraud"}
+    at_nodes = () if in_triangles else (np.nan_to_num(colours),)
+    image = ax.tripcolor(*fields["places_um"].T, *at_nodes, triangles=triangles[~missing],
+                         rasterized=True, cmap=style.cmap, **kind)
     if style.log:
         image.set_norm(optional("matplotlib.colors").LogNorm())
     image.set_clim(*limits)
-    _draw_outline(ax, fields)
+    edges, shared = outlines.boundary(cells, fields["region"] > 0.5)
+    lines = outlines.curved(fields["places_um"][edges[shared]])
+    _add_lines(ax, lines, colors=OUTLINE, capstyle="round")
     bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.02, 0, 0.02, 1]))
     if not style.log:
         bar.formatter.set_powerlimits((-3, 4))
@@ -182,12 +193,21 @@ def shown(fields: Mapping[str, np.ndarray], name: str, style: Style) -> np.ndarr
 
 @dataclass(frozen=True)
 class Photograph:
-    """A microscope image: file or array, um per pixel, and (x, y) um of its lower left corner, by
-    default with the middle of its lower edge at the origin."""
+    """A microscope image: file or array, None without one, um per pixel, and (x, y) um of its lower
+    left corner, by default with the middle of its lower edge at the origin."""
 
     image: Any
-    um_per_pixel: float
+    um_per_pixel: float | None
     corner: Sequence[float] | None = None
+
+    def check(self) -> None:
+        """Raise ValueError if the image lacks its scale."""
+        if self.image is self.um_per_pixel is self.corner is None:
+            return
+        if self.image is None or not (self.um_per_pixel and self.um_per_pixel > 0):
+            raise ValueError("um_per_pixel: a number greater than zero is needed with an image")
+        if self.corner is not None and len(self.corner) != 2:
+            raise ValueError(f"corner: a place (x, y) in um is needed, not {self.corner!r}")
 
     def draw(self, ax: Any, factor: float) -> None:
         """Draw the image in the coordinates of the pore; factor: of their unit, from um."""
@@ -198,26 +218,24 @@ class Photograph:
         ax.imshow(pixels, extent=(left, left + width, low, low + height), cmap="gray")
 
 
-def drawn_outlines(lines: Sequence[outlines.Outline], title: str, box: np.ndarray, ax: Any = None,
-                   photograph: Photograph | None = None, style: Style = PLAIN) -> Any:
+def drawn_outlines(lines: Sequence[outlines.Outline], title: str, box: np.ndarray, ax: Any,
+                   photograph: Photograph, style: Style) -> Any:
     """Draw outlines, coloured by their times, over an image if there is one; returns the axes.
 
     box: lower left and upper right corner (um) of the pore.
     """
     unit, factor = style.unit_of("outline_um")
-    if ax is None:
-        _, ax = optional(PYPLOT).subplots(figsize=field_size(box), layout="constrained")
+    ax = _axes(ax, field_size(box))
     low, high = factor * box
-    if photograph:
+    if photograph.image is not None:
         photograph.draw(ax, factor)
     else:
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         ax.hlines([low[1], high[1]], low[0], high[0], color="0.4")
-    collection = optional("matplotlib.collections").LineCollection
-    drawn = collection([factor * each.points for each in lines], cmap=style.cmap, linewidths=1.5,
-                       array=np.array([each.time for each in lines]))
-    ax.add_collection(drawn)
-    if len({each.time for each in lines}) > 1:
+    times = [each.time for each in lines]
+    drawn = _add_lines(ax, [factor * each.points for each in lines], cmap=style.cmap,
+                       array=np.array(times))
+    if len(set(times)) > 1:
         ax.figure.colorbar(drawn, cax=ax.inset_axes([1.02, 0, 0.02, 1])).set_label("time (h)")
     ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", aspect="equal")
     ax.set_title(_plain(title), loc="left")
@@ -236,11 +254,10 @@ def against(frame: Any, factors: Sequence[Any], name: str, title: str, ax: Any =
 
     frame: a ``pandas.DataFrame`` with a row for each run; factors: the varied keys.
     """
-    if ax is None:
-        _, ax = optional(PYPLOT).subplots(figsize=(WIDTH, 2 * PANEL), layout="constrained")
+    ax = _axes(ax, (WIDTH, 2 * PANEL))
     first, *others = factors
-    columns = [factor.column for factor in others]
-    groups = frame.groupby(columns, sort=False) if columns else [((), frame)]
+    groups = [((), frame)] if not others else \
+        frame.groupby([factor.column for factor in others], sort=False)
     for values, group in groups:
         label = ", ".join(f"{factor.key} = {factor.short(value)}"
                           for factor, value in zip(others, values))
@@ -264,39 +281,16 @@ def magnitude(values: np.ndarray) -> np.ndarray:
     return np.linalg.norm(values, axis=1) if values.ndim == 2 else values
 
 
-def value_range(values: np.ndarray) -> np.ndarray:
-    """(2,) the least and the largest value, without NaN."""
-    return np.array([np.nanmin(values), np.nanmax(values)])
+def value_range(*values: np.ndarray) -> np.ndarray:
+    """(2,) the least and the largest of values, without NaN."""
+    every = np.concatenate(values)
+    return np.array([np.nanmin(every), np.nanmax(every)])
 
 
-def corners(fields: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(2, 2) lower left and upper right corner of a mesh, um."""
-    points = fields["places_um"]
+def corners(*fields: Mapping[str, np.ndarray]) -> np.ndarray:
+    """(2, 2) lower left and upper right corner of meshes, um."""
+    points = np.vstack([each["places_um"] for each in fields])
     return np.array([points.min(axis=0), points.max(axis=0)])
-
-
-def _image(ax: Any, fields: Mapping[str, np.ndarray], values: np.ndarray,
-           cmap: str | None) -> Any:
-    """Draw values at nodes smoothly, and values in triangles as they are; NaN stays empty."""
-    cells = fields["triangles"]
-    parts = np.array(PARTS[cells.shape[1]])
-    triangles = cells[:, parts].reshape(-1, 3)
-    x, y = fields["places_um"].T
-    in_triangles = len(values) == len(cells)
-    colours = np.repeat(values, len(parts)) if in_triangles else values
-    missing = np.isnan(colours) if in_triangles else np.isnan(colours[triangles]).any(axis=1)
-    kind = {"facecolors": colours[~missing]} if in_triangles else {"shading": "gouraud"}
-    at_nodes = () if in_triangles else (np.nan_to_num(colours),)
-    return ax.tripcolor(x, y, *at_nodes, triangles=triangles[~missing], rasterized=True, cmap=cmap,
-                        **kind)
-
-
-def _draw_outline(ax: Any, fields: Mapping[str, np.ndarray]) -> None:
-    """Draw the edges that the aggregate shares with the fluid, as curves where they are curved."""
-    edges, shared = outlines.boundary(fields["triangles"], fields["region"] > 0.5)
-    lines = outlines.curved(fields["places_um"][edges[shared]])
-    collection = optional("matplotlib.collections").LineCollection
-    ax.add_collection(collection(lines, colors=OUTLINE, linewidths=1.5, capstyle="round"))
 
 
 def film(results: Results, name: str, file: Path, ax: Any = None, style: Style = PLAIN) -> Any:
@@ -307,19 +301,28 @@ def film(results: Results, name: str, file: Path, ax: Any = None, style: Style =
     """
     write = _write_mp4 if file.suffix == ".mp4" else _write_gif
     with output_path(file) as beside:
-        return write(beside, partial(_frames, results, name, style), ax, style)
+        return write(beside, partial(_frames, results, name, style), ax)
 
 
-def _write_gif(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any, style: Style) -> Any:
-    images = []
+def _write_gif(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any) -> Any:
+    """Write frames in the colours of the first one, whose colour bar has all; later ones keep its
+    layout."""
+    image = optional("PIL.Image")
+    images: list[Any] = []
+    palette = None
     for last in frames(ax):
-        images.append(_frame(last.figure, style))
+        content = io.BytesIO()
+        last.figure.savefig(content, format="png", dpi=RESOLUTION)
+        last.figure.set_layout_engine("none")
+        picture = image.open(content).convert("RGB")
+        palette = palette or picture.quantize()
+        images.append(picture.quantize(palette=palette, dither=0))
     images[0].save(file, format="GIF", save_all=True, append_images=images[1:], duration=FRAME,
                    loop=0)
     return last
 
 
-def _write_mp4(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any, style: Style) -> Any:
+def _write_mp4(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any) -> Any:
     """Write frames by ffmpeg. Raises ImportError if it is not installed."""
     writer = optional("matplotlib.animation").FFMpegWriter
     if not writer.isAvailable():
@@ -336,40 +339,54 @@ def _write_mp4(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any, styl
 
 def _frames(results: Results, name: str, style: Style, ax: Any) -> Iterator[Any]:
     """Draw the rows one after the other; yields the axes."""
-    rows = [(time, results.fields(time)) for time in results.time]
-    bounds = np.array([value_range(shown(fields, name, style)) for _, fields in rows])
-    boxes = np.array([corners(fields) for _, fields in rows])
-    limits = np.array([np.nanmin(bounds[:, 0]), np.nanmax(bounds[:, 1])])
-    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
-    for time, fields in rows:
+    rows = list(map(results.fields, results.time))
+    limits = value_range(*(shown(fields, name, style) for fields in rows))
+    box = corners(*rows)
+    for time, fields in zip(results.time, rows):
         if ax is not None:
             ax.clear()
         ax = field(fields, name, heading(results, time, style), ax, limits, box, style)
         yield ax
 
 
-def _frame(figure: Any, style: Style) -> Any:
-    """The picture of a figure, in the colours of a film; later frames keep its layout."""
-    image = optional("PIL.Image")
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=RESOLUTION)
-    figure.set_layout_engine("none")
-    palette = image.new("P", (1, 1))
-    palette.putpalette(_palette(style).tobytes())
-    return image.open(content).convert("RGB").quantize(palette=palette, dither=0)
-
-
-def _palette(style: Style) -> np.ndarray:
-    """(256, 3) colours of a film: those of the fields, greys, and shades of the outline."""
-    map_colours = optional(PYPLOT).get_cmap(style.cmap)(np.linspace(0, 1, 216))[:, :3]
-    greys = np.repeat(np.linspace(0, 1, 32)[:, None], 3, axis=1)
-    outline = np.array(optional("matplotlib.colors").to_rgb(OUTLINE))
-    shades = [outline + share * (map_colours[k] - outline)
-              for k in (0, 71, 143, 215) for share in (0, 0.5)]
-    colours = np.vstack([map_colours, greys, shades])
-    return (255 * colours).round().astype(np.uint8)
-
-
 def heading(results: Results, time: float, style: Style = PLAIN) -> str:
     """The title of a picture, by default the name of the scene, and a time (h)."""
     return f"{style.title or results.name}, t = {time:.4g} h"
+
+
+def key_figures(columns: Mapping[str, np.ndarray]) -> str:
+    """First and last values of a run's columns, and the time of contact with the opposite wall."""
+    time = columns["time_h"]
+    texts = []
+    for name in names.ANSWER:
+        if name in columns:
+            first, last = columns[name][[0, -1]]
+            change = f" → {last:.4g}" if len(time) > 1 else ""
+            texts.append(f"{names.words(name)} {first:.4g}{change} {names.unit(name)}")
+    touching = time[columns["contact"] == 1] if "contact" in columns else time[:0]
+    if len(touching):
+        texts.append(f"contact with the opposite wall from t = {touching[0]:.4g} h on")
+    return f"t = {time[0]:.4g} to {time[-1]:.4g} h: {'; '.join(texts)}"
+
+
+def figure(fields: Mapping[str, np.ndarray], title: str, time: float) -> str:
+    """The acceptor, or the velocity without it, at a time (h) as HTML with a picture, for a
+    notebook that shows a run; empty without these fields or matplotlib.
+    """
+    name = next((name for name in ("acceptor_mg_per_L", "velocity_m_per_d") if name in fields), "")
+    if not name:
+        return ""
+    try:
+        new_figure = optional("matplotlib.figure").Figure  # pyplot would show it once more
+    except ImportError:
+        return ""
+    drawn = new_figure(figsize=field_size(corners(fields)), layout="constrained")
+    field(fields, name, title, drawn.subplots())
+    content = io.BytesIO()
+    drawn.savefig(content, format="png", dpi=SMALL)
+    picture = base64.b64encode(content.getvalue()).decode("ascii")
+    low, high = value_range(magnitude(fields[name]))
+    caption = escape(f"{names.with_unit(name)}, {low:.4g} (dark) to {high:.4g} (light), at "
+                     f"t = {time:.4g} h; red: boundary of the aggregate")
+    return (f'<figure><img alt="{caption}" src="data:image/png;base64,{picture}">'
+            f"<figcaption>{caption}</figcaption></figure>")

@@ -6,6 +6,7 @@ imported with the first file, because many commands neither write nor read one.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,6 +17,8 @@ from repro.errors import OutputError
 from repro.results.files import MOST_DATA
 from repro.results.files import read as read_file
 
+#: The names of a run's files in its folder.
+NAME = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 #: The name by which VTK's readers know the time of a grid.
 TIME = "TimeValue"
 #: meshio's name of a triangle, by its number of nodes.
@@ -36,6 +39,12 @@ class Grid:
     point_data: dict[str, np.ndarray] = field(default_factory=dict)
     cell_data: dict[str, np.ndarray] = field(default_factory=dict)
     time: float = 0.0
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays by name, as Python's results have them."""
+        return {"places_um": self.points[:, :2], "triangles": self.cells, **self.point_data,
+                **self.cell_data}
 
 
 def write(path: Path, grid: Grid) -> None:

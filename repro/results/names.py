@@ -29,36 +29,38 @@ ANSWER = ("conductivity_m_per_d", "aggregate_area_um2", "thickness_um",
 
 def known(name: str) -> Quantity | None:
     """The quantity of a name, also that of one aggregate among several; None if it is unknown."""
-    if name in KNOWN:
-        return KNOWN[name]
-    return next((of_body(quantity, label_in(name, quantity)) for quantity in BODY
-                 if label_in(name, quantity)), None)
+    of_bodies = (of_body(quantity, label_in(name, quantity)) for quantity in BODY
+                 if label_in(name, quantity))
+    return KNOWN.get(name) or next(of_bodies, None)
 
 
 def label_in(name: str, quantity: Quantity) -> str:
     """The label of the aggregate in the name of a quantity of ``BODY``; empty in other names."""
     before, after = quantity.name.split("NAME")
-    own = len(name) > len(before + after) and name.startswith(before) and name.endswith(after)
-    return name[len(before):-len(after)] if own else ""
+    matches = len(name) > len(before + after) and name.startswith(before) and name.endswith(after)
+    return name[len(before):-len(after)] if matches else ""
 
 
 def label(name: str) -> str:
     """The short name of a column, for a legend; its words if it has none."""
     quantity = known(name)
-    return quantity.label if quantity and quantity.label else words(name)
+    return (quantity and quantity.label) or words(name)
 
 
 def words(name: str) -> str:
     """The words of a name, without its unit; an unknown name without underscores."""
     quantity = known(name)
-    if quantity:
-        return quantity.words
-    return name.removesuffix(ending(name)).replace("_", " ")
+    return quantity.words if quantity else name.removesuffix(ending(name)).replace("_", " ")
 
 
 def udunits(name: str) -> str:
     """The unit of a name in the spelling of UDUNITS, "1" for a pure number."""
     return unit_of(name).udunits
+
+
+def attributes(name: str) -> dict[str, str]:
+    """The attributes of a variable by the conventions of CF: unit and words."""
+    return {"units": udunits(name), "long_name": words(name)}
 
 
 def unit(name: str) -> str:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from repro.model.flow import poiseuille_loss
 from repro.results import M_PER_D, write_table
 from repro.results.files import output_path
 from repro.scene import load_scene
@@ -36,22 +37,19 @@ class Law:
     constants: tuple[tuple[str, float, float], ...] = ()
 
 
-def _kozeny_carman(biomass: np.ndarray, clean: float) -> np.ndarray:
-    """clean: n0, the porosity of the clean medium; n = n0 x."""
-    porosity = clean * (1 - biomass)
-    return (1 - biomass)**3 * ((1 - clean) / (1 - porosity))**2
-
-
 def _vandevivere(biomass: np.ndarray, critical: float, plug: float) -> np.ndarray:
     """critical: B beyond which biomass forms plugs; plug: K / K0 of plugs."""
     films = np.exp(-0.5 * (biomass / critical)**2)
     return films * (1 - biomass)**2 + (1 - films) * plug / (plug + biomass * (1 - plug))
 
 
-#: By the name of their column.
+#: By the name of their column; n0 is the porosity of the clean medium, and n0 x that of the pore.
 LAWS = {
     "power": Law("x^b", lambda biomass, power: (1 - biomass)**power, (("b", 3.0, np.inf),)),
-    "kozeny_carman": Law("x^3 ((1 - n0) / (1 - n0 x))^2", _kozeny_carman, (("n0", 0.4, 1.0),)),
+    "kozeny_carman": Law(
+        "x^3 ((1 - n0) / (1 - n0 x))^2", lambda biomass, clean: (
+            (1 - biomass)**3 * ((1 - clean) / (1 - clean * (1 - biomass)))**2),
+        (("n0", 0.4, 1.0),)),
     "clement": Law("x^(19/6)", lambda biomass: (1 - biomass)**(19 / 6)),
     "okubo_matsumoto": Law("x^2", lambda biomass: (1 - biomass)**2),
     "vandevivere": Law("f x^2 + (1 - f) k / (k + B (1 - k)), f = exp(-(B / Bc)^2 / 2)",
@@ -95,8 +93,8 @@ class Permeability:
     def to_csv(self, file: str | Path) -> None:
         """Write the columns to a CSV file. Raises OutputError if it cannot be written."""
         with output_path(Path(file)) as beside:
-            rows = zip(*(values.tolist() for values in self.columns.values()))
-            write_table(beside, list(self.columns), list(map(list, rows)))
+            write_table(beside, list(self.columns),
+                        zip(*(values.tolist() for values in self.columns.values())))
 
     def __str__(self) -> str:
         biomass = self.columns["biomass_per_pore_volume"]
@@ -129,22 +127,23 @@ def of_runs(runs: Sequence[Results]) -> Permeability:
 def _relative(run: Results) -> tuple[np.ndarray, np.ndarray]:
     """B and K / K0 of the rows of a run."""
     scene = load_scene(dict(run.tables))
-    clean = scene.flow.gravity * scene.pore.whole_width**2 / (12 * scene.flow.kinematic_viscosity)
-    biomass = run["aggregate_area_um2"] / (scene.pore.width * scene.pore.length)
+    flow, pore = scene.flow, scene.pore
+    clean = flow.gravity / (flow.kinematic_viscosity * poiseuille_loss(1.0, pore.whole_width))
+    biomass = run["aggregate_area_um2"] / (pore.width * pore.length)
     return biomass, run["conductivity_m_per_d"] / (M_PER_D * clean)
 
 
 def fitted(law: Law, biomass: np.ndarray, relative: np.ndarray) -> Fit:
     """Fit the constants of a law to ln(K / K0); each row has the same weight."""
-    def apart(constants: np.ndarray) -> np.ndarray:
+    def deviations(constants: np.ndarray) -> np.ndarray:
         return np.log(law.relative(biomass, *constants) / relative)
 
     values = errors = np.zeros(0)
     if law.constants:
         from scipy.optimize import least_squares  # its import takes a quarter of a second
 
-        _, first, most = zip(*law.constants)
-        fit = least_squares(apart, first, bounds=(0, most), x_scale="jac")
+        _, first, upper = zip(*law.constants)
+        fit = least_squares(deviations, first, bounds=(0, upper), x_scale="jac")
         values = fit.x
         _, sizes, directions = np.linalg.svd(fit.jac, full_matrices=False)
         sizes = np.maximum(sizes, np.finfo(float).eps)  # it is 0 where the rows leave one open
@@ -152,6 +151,6 @@ def fitted(law: Law, biomass: np.ndarray, relative: np.ndarray) -> Fit:
         errors = scatter * np.linalg.norm(directions.T / sizes, axis=1)
     pairs = zip(values.tolist(), errors.tolist())
     constants = {symbol: pair for (symbol, *_), pair in zip(law.constants, pairs)}
-    deviations = apart(values)
-    return Fit(law, constants, float(np.sqrt(np.mean(deviations**2))),
-               float(np.exp(np.abs(deviations).max())))
+    remaining = deviations(values)
+    return Fit(law, constants, float(np.sqrt(np.mean(remaining**2))),
+               float(np.exp(np.abs(remaining).max())))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from math import isnan
 from typing import Any
 
 
@@ -111,6 +112,11 @@ def is_modelled(quantity: Quantity, conditions: dict[str, Callable[..., bool]],
     """Return whether all parts are modelled that the quantity needs."""
     needed = quantity.needs.split(" and ") if quantity.needs else []
     return all(conditions[word](*arguments) for word in needed)
+
+
+def none_if_nan(value: float) -> float | None:
+    """Return a float, or None for not-a-number."""
+    return None if isnan(value) else float(value)
 
 
 def ending(name: str) -> str:

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from html import escape
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from repro import results
-from repro.errors import RunEnd
+from repro.errors import RunEnd, printable
 from repro.march.simulation import report_at, reports, steps
 from repro.march.state import SAME_TIME, Report, RestartState
-from repro.results import drawing, names, netcdf, outlines, picture, sampling
+from repro.results import drawing, names, outlines, sampling
 from repro.results.drawing import Photograph, Style
-from repro.results.field_files import Grid
-from repro.results.netcdf import TIME
+from repro.results.files import output_path
 from repro.results.outlines import Outline
 from repro.results.quantities import plain as unit
 from repro.scene import Scene, Source, bodies, load_scene, scene_tables
 from repro.scene.arguments import Overrides, typed
+from repro.scene.needed import package
 from repro.scene.units import to_internal
 from repro.schemes import Scheme
 from repro.timing import progress_bar
@@ -31,6 +31,8 @@ from repro.timing import progress_bar
 if TYPE_CHECKING:
     from repro.results.permeability import Permeability
 
+CONVENTIONS = "CF-1.11"
+TIME = "time_h"
 #: The name of the picture of all outlines.
 OUTLINES = "outlines"
 #: Number of outlines that a picture shows, if no times are given.
@@ -94,9 +96,7 @@ class Results(Mapping[str, np.ndarray]):
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.columns:
-            near = difflib.get_close_matches(name, self.columns, n=1, cutoff=0.5)
-            meant = f"; did you mean {near[0]}?" if near else ""
-            raise KeyError(f"{name}: this scene has no such column{meant}")
+            raise _unknown(name, "this scene has no such column", self.columns)
         return self.columns[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -167,12 +167,17 @@ class Results(Mapping[str, np.ndarray]):
         row = self._row(hours, method)
         if row is not None:
             return self._fields[row]
-        if self._rerun and len(self.time):
-            end = self._end
-            if 0 <= hours <= end:
+        times = self.time
+        if not len(times):
+            raise KeyError(f"{hours} h: not a reported time; there is no row")
+        if self._rerun:
+            if 0 <= hours <= self._end:
                 return self._rerun(hours)
-            raise KeyError(f"{hours} h: outside the run, from 0 to {end:g} h")
-        raise KeyError(f"{hours} h: not a reported time; {self._rows_beside(hours)}")
+            raise KeyError(f"{hours} h: outside the run, from 0 to {self._end:g} h")
+        after = int(np.searchsorted(times, hours))
+        near = " and ".join(f"{beside:.6g}" for beside in times[max(after - 1, 0):after + 1])
+        raise KeyError(f"{hours} h: not a reported time; the nearest rows are at {near} h, of "
+                       f"{len(times)} from {times[0]:.6g} to {times[-1]:.6g} h")
 
     @property
     def _end(self) -> float:
@@ -189,17 +194,6 @@ class Results(Mapping[str, np.ndarray]):
         if len(distance) and (distance.min() <= SAME_TIME or method and np.isfinite(time)):
             return int(distance.argmin())
         return None
-
-    def _rows_beside(self, time: float) -> str:
-        """Say which rows exist: all times, or the nearest ones before and after a time (h)."""
-        count = len(self.time)
-        if not count:
-            return "there is no row"
-        after = int(np.searchsorted(self.time, time))
-        beside = self.time[max(after - 1, 0):after + 1]
-        near = " and ".join(f"{neighbour:.6g}" for neighbour in beside)
-        return (f"the nearest rows are at {near} h, of {count} from {self.time[0]:.6g} to "
-                f"{self.time[-1]:.6g} h")
 
     @typed
     def probe(self, name: str, x: float | str, y: float | str) -> np.ndarray:
@@ -280,22 +274,16 @@ class Results(Mapping[str, np.ndarray]):
         if (x is None) == (y is None) or points < 2:
             raise ValueError("profile: one of x and y, and two points or more, are needed")
         fields = self.fields(time)
-        (left, low), (right, high) = drawing.corners(fields)
-        if x is not None:
-            along = np.linspace(low, high, points)
-            places = np.column_stack([np.full(points, self._coordinate("x", x)), along])
-        else:
-            along = np.linspace(left, right, points)
-            places = np.column_stack([along, np.full(points, self._coordinate("y", y))])
-        return along, sampling.sample(fields, self._field(name, fields), places)
+        axis, other, value = ("x", 1, x) if x is not None else ("y", 0, y)
+        places = np.full((points, 2), self._coordinate(axis, value))
+        low, high = drawing.corners(fields)[:, other]
+        places[:, other] = np.linspace(low, high, points)
+        values = sampling.sample(fields, self._field(name, fields), places)
+        return places[:, other].copy(), values
 
     def _coordinate(self, axis: str, value: float | str) -> float:
         """Return a coordinate, um. Raises ValueError if it is outside the pore."""
-        try:
-            place = to_internal(value, "um") if isinstance(value, str) else value
-        except (ValueError, OverflowError):
-            raise ValueError(f'{axis}: {value!r}: a number of um or a text such as "20 um" is '
-                             "needed") from None
+        place = _parsed(axis, value, "um", "um", "20 um")
         pore = self.tables.get("pore", {})
         length, width = (to_internal(pore[key], "um") if key in pore else np.inf
                          for key in ("length", "width"))
@@ -424,13 +412,28 @@ class Results(Mapping[str, np.ndarray]):
                                  "times; the name of a field is needed")
             if unit is not None and not column:
                 raise ValueError("unit: the name of a column is needed with it")
-            panels: Sequence[Sequence[str]] = [(column,)] if column else self._panels()
+            panels = [(column,)] if column else \
+                [panel for panel in drawing.PANELS if set(panel) <= set(self.columns)]
+            if not panels:
+                raise KeyError("this scene has no curves of flow, growth or uptake; name a column")
             axes = drawing.curves(self, panels, ax, style)
             return axes[0] if column else axes
         if name == OUTLINES:
-            times = _evenly(self.time) if time is None else np.array(time, dtype=object)
-            under = _photograph(image, um_per_pixel, corner)
-            return self._plot_outlines(np.atleast_1d(times), ax, under, style)
+            photograph = Photograph(image, um_per_pixel, corner)
+            photograph.check()
+            if time is None and len(self.time):  # the rows nearest to equal intervals
+                even = np.linspace(self.time[0], self.time[-1], MOST_OUTLINES)
+                rows = np.unique(np.abs(self.time - even[:, None]).argmin(axis=1))
+                time = self.time[rows].tolist()
+            lines = []
+            for each in np.atleast_1d(np.array([] if time is None else time, dtype=object)):
+                fields = self.fields(each)
+                present = np.unique(fields["region"].round()).astype(int)
+                lines += [self.outline(each, int(number)) for number in present if number]
+            if not lines:
+                raise KeyError(f"{OUTLINES}: this run has no aggregate at these times")
+            heading, box = title or self.name, drawing.corners(fields)
+            return drawing.drawn_outlines(lines, heading, box, ax, photograph, style)
         if isinstance(time, Sequence) and not isinstance(time, str):
             raise TypeError("plot: time: one time of a field is needed, not a list")
         hours = (self.time[-1] if len(self.time) else 0.0) if time is None else _hours(time)
@@ -438,19 +441,6 @@ class Results(Mapping[str, np.ndarray]):
         full_name = self._field(name, fields)
         heading = title or drawing.heading(self, hours)
         return drawing.field(fields, full_name, heading, ax, style=style)
-
-    def _plot_outlines(self, times: np.ndarray, ax: Any, photograph: Photograph | None,
-                       style: Style) -> Any:
-        """Draw the outlines of all aggregates at times."""
-        lines = []
-        for time in times:
-            present = np.unique(self.fields(time)["region"].round()).astype(int)
-            lines += [self.outline(time, int(number)) for number in present if number]
-        if not lines:
-            raise KeyError(f"{OUTLINES}: this run has no aggregate at these times")
-        box = drawing.corners(self.fields(times[-1]))
-        heading = style.title or self.name
-        return drawing.drawn_outlines(lines, heading, box, ax, photograph, style)
 
     def drawable(self) -> dict[str, str]:
         """Return what :meth:`plot` draws.
@@ -472,21 +462,12 @@ class Results(Mapping[str, np.ndarray]):
         outlined = {OUTLINES: "outlines of the aggregates over time"} if self._bodies else {}
         return {name: names.with_unit(name) for name in known} | outlined
 
-    def _panels(self) -> list[tuple[str, ...]]:
-        """Find the columns of each panel of curves. Raises KeyError if the scene has none."""
-        panels = [panel for panel in drawing.PANELS if set(panel) <= set(self.columns)]
-        if not panels:
-            raise KeyError("this scene has no curves of flow, growth or uptake; name a column")
-        return panels
-
     def _field(self, name: str, fields: Mapping[str, np.ndarray]) -> str:
         """Full name of a field. Raises KeyError, with the nearest name, if there is none."""
         drawn = [key for key in fields if key not in ("places_um", "triangles")]
         field = drawing.full_name(name, drawn)
         if not field:
-            near = difflib.get_close_matches(name, [*self.columns, *drawn], n=1, cutoff=0.5)
-            meant = f"; did you mean {near[0]}?" if near else ""
-            raise KeyError(f"{name}: this run has no such column or field{meant}")
+            raise _unknown(name, "this run has no such column or field", [*self.columns, *drawn])
         return field
 
     @typed
@@ -623,39 +604,33 @@ class Results(Mapping[str, np.ndarray]):
         >>> repro.solve("flow_only").to_xarray(["velocity"])["velocity_m_per_d"].dims
         ('time_h', 'y_um', 'x_um', 'axis')
         """
-        attributes = {name: {"units": names.udunits(name), "long_name": names.words(name)}
-                for name in self.columns}
-        columns = {name: (TIME, values, attributes[name]) for name, values in self.columns.items()}
+        columns = {name: (TIME, values, names.attributes(name))
+                   for name, values in self.columns.items()}
         times = {TIME: columns.pop(TIME)}
         about = {"scene": self.name, "status": self.status}
         dataset = package("xarray").Dataset(columns, times, about)
-        return dataset.assign(self._gridded(fields, across)) if len(fields) else dataset
-
-    def _gridded(self, fields: Sequence[str], across: int) -> dict[str, Any]:
-        """Fields of all rows on a regular grid, by name, as ``xarray.DataArray``s."""
-        rows = [self.fields(time) for time in self.time]
+        rows = list(map(self.fields, self.time)) if len(fields) else []
         full_names = [self._field(name, rows[0] if rows else {}) for name in fields]
-        boxes = np.array([drawing.corners(each) for each in rows])
-        box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
-        x, y = sampling.grid(box, across)
+        if not rows:
+            return dataset
+        x, y = sampling.grid(drawing.corners(*rows), across)
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        coordinates = {TIME: self.time, "y_um": y, "x_um": x, "axis": ["x", "y", "z"]}
-        gridded = {}
+        coordinates = {"y_um": y, "x_um": x, "axis": ["x", "y", "z"]}
         for name in full_names:
             values = np.array([sampling.sample(each, name, places) for each in rows])
             values = values.reshape(len(rows), len(y), len(x), *values.shape[2:])
-            dims = list(coordinates)[:values.ndim]
-            gridded[name] = package("xarray").DataArray(
-                values, {dim: coordinates[dim] for dim in dims}, dims,
-                attrs={"units": names.udunits(name), "long_name": names.words(name)})
-        return gridded
+            dims = [*coordinates][:values.ndim - 1]
+            dataset = dataset.assign_coords({dim: coordinates[dim] for dim in dims})
+            dataset[name] = ([TIME, *dims], values, names.attributes(name))
+        return dataset
 
     @typed
     def to_netcdf(self, file: str | Path) -> None:
         """Write the columns as NetCDF with CF conventions.
 
-        The file has the variables of :meth:`to_xarray`, the scene and its hash, and the versions of
-        the packages.
+        The file has the variables of :meth:`to_xarray` to the last bit, the scene and its hash, and
+        the versions of the packages. Its time axis lacks the "since ..." of CF, because simulated
+        time has no date.
 
         Parameters
         ----------
@@ -679,7 +654,18 @@ class Results(Mapping[str, np.ndarray]):
         ...     xarray.load_dataset(f"{folder}/run.nc").mean_velocity_m_per_d.item()
         2.9
         """
-        netcdf.write(Path(file), self.to_xarray(), self.tables, self.provenance)
+        about = {"Conventions": CONVENTIONS, "title": f"Clogging of one pore: {self.name}",
+                 "status": printable(self.status), "scene_tables": json.dumps(self.tables)}
+        if self.provenance:
+            versions = self.provenance["versions"]
+            about |= {"source": f"dupin2001-repro {versions['dupin2001-repro']}",
+                      "scene_hash": self.provenance["hash"], "versions": json.dumps(versions)}
+        dataset = self.to_xarray().astype(float).assign_attrs(about)
+        encoding = {name: {"_FillValue": None if name == TIME else np.nan}
+                    for name in dataset.variables}
+        with output_path(Path(file)) as beside:
+            dataset.to_netcdf(beside.absolute(), engine="scipy", format="NETCDF3_64BIT",
+                              encoding=encoding)
 
     def __repr__(self) -> str:
         size = f"{len(self.time)} rows, {len(self)} columns"
@@ -692,63 +678,39 @@ class Results(Mapping[str, np.ndarray]):
         """
         rows = list(range(len(self.time)))
         rows = rows if len(rows) <= 2 * END_TIMES else [*rows[:END_TIMES], *rows[-END_TIMES:]]
-        lines = [_html_row(f"{name} ({unit(name)})", column[rows])
-                 for name, column in self.items()]
+        lines = ""
+        for name, column in self.items():
+            cells = "".join(f"<td>{value:.4g}</td>" for value in column[rows])
+            lines += f"<tr><th>{escape(f'{name} ({unit(name)})')}</th>{cells}</tr>"
         caption = escape(f"{self.name}: {len(self.time)} rows, {len(rows)} shown; {self.status}")
-        table = f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
-        return f"{self._summary()}<details><summary>{caption}</summary>{table}</details>"
+        summary = image = ""
+        if rows and len(self._fields) == len(rows):
+            time = self.time[-1]
+            image = drawing.figure(self._fields[-1], drawing.heading(self, time), time)
+        if rows:
+            summary = f"<p>{escape(self.name)}, {escape(drawing.key_figures(self))}</p>{image}"
+        return (f"{summary}<details><summary>{caption}</summary><table><caption>{caption}</caption>"
+                f"{lines}</table></details>")
 
-    def _summary(self) -> str:
-        """Key figures and the picture of the last state; empty if the run has no rows."""
-        if not len(self.time):
-            return ""
-        has_fields = len(self._fields) == len(self.time)
-        time = self.time[-1]
-        title = drawing.heading(self, time)
-        image = picture.figure(self._fields[-1], title, time) if has_fields else ""
-        return f"<p>{escape(self.name)}, {escape(picture.key_figures(self))}</p>{image}"
-
-
-def _hours(time: float | str) -> float:
-    """Return a time in hours. Raises ValueError if a text is not a time with a unit."""
-    if not isinstance(time, str):
-        return time
+def _parsed(name: str, value: float | str, unit: str, noun: str, example: str) -> float:
+    """Return an argument in a unit. Raises ValueError if a text is not a number with a unit."""
+    if not isinstance(value, str):
+        return value
     try:
-        return to_internal(time, "h")
+        return to_internal(value, unit)
     except (ValueError, OverflowError):
-        raise ValueError(f'time: {time!r}: a number of hours or a text such as "90 min" is '
+        raise ValueError(f'{name}: {value!r}: a number of {noun} or a text such as "{example}" is '
                          "needed") from None
 
 
-def _evenly(times: np.ndarray) -> np.ndarray:
-    """Return the times nearest to MOST_OUTLINES equal intervals."""
-    wanted = np.linspace(times[0], times[-1], MOST_OUTLINES) if len(times) else times
-    return times[np.unique(np.abs(times - wanted[:, None]).argmin(axis=1))] if len(times) else times
+def _hours(time: float | str) -> float:
+    return _parsed("time", time, "h", "hours", "90 min")
 
 
-def _photograph(image: Any, um_per_pixel: float | None,
-                corner: Sequence | None) -> Photograph | None:
-    """Return the image under outlines. Raises ValueError if it lacks its scale."""
-    if image is None and um_per_pixel is None and corner is None:
-        return None
-    if image is None or not (um_per_pixel and um_per_pixel > 0):
-        raise ValueError("um_per_pixel: a number greater than zero is needed with an image")
-    if corner is not None and len(corner) != 2:
-        raise ValueError(f"corner: a place (x, y) in um is needed, not {corner!r}")
-    return Photograph(image, um_per_pixel, corner)
-
-
-def _html_row(head: str, values: np.ndarray) -> str:
-    cells = "".join(f"<td>{value:.4g}</td>" for value in values)
-    return f"<tr><th>{escape(head)}</th>{cells}</tr>"
-
-
-def package(name: str):
-    """Import an optional package. Raises ImportError, in one line, if it is not installed."""
-    try:
-        return import_module(name)
-    except ImportError:
-        raise ImportError(f"the package {name} is not installed; pip install {name}") from None
+def _unknown(name: str, message: str, known: Iterable[str]) -> KeyError:
+    """Return the error of a name that is not known, with the nearest one."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    return KeyError(f"{name}: {message}{f'; did you mean {near[0]}?' if near else ''}")
 
 
 @typed
@@ -811,7 +773,7 @@ def solve(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = ()
         try:
             for instant in reports(reported()):
                 rows.append(results.row(scene, instant))
-                fields.append(arrays(results.fields(scene, instant.pore, instant.solved)))
+                fields.append(_arrays(scene, instant))
                 show(instant.pore.time, duration)
         except RunEnd as end:
             status = str(end)
@@ -821,11 +783,8 @@ def solve(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = ()
 
 def fields_at(scene: Scene, state: RestartState | None, time: float) -> dict[str, np.ndarray]:
     """Return the fields of a row at a time (h), computed from an earlier state of the run."""
-    report = report_at(scene, state, time)
-    return arrays(results.fields(scene, report.pore, report.solved))
+    return _arrays(scene, report_at(scene, state, time))
 
 
-def arrays(content: Grid) -> dict[str, np.ndarray]:
-    """Return the arrays of a grid by name."""
-    return {"places_um": content.points[:, :2], "triangles": content.cells, **content.point_data,
-            **content.cell_data}
+def _arrays(scene: Scene, report: Report) -> dict[str, np.ndarray]:
+    return results.fields(scene, report.pore, report.solved).arrays

@@ -162,16 +162,14 @@ def _refuse_another(recorder: Recorder, record: dict) -> None:
 
 def _describe(differing: dict[str, list], earlier: str = "there") -> str:
     """List the first differing keys with both values, and the number of the others."""
-    pairs = [f"{key.removeprefix('tables.')} ({_text(before)} {earlier}, now {_text(after)})"
-             for key, (before, after) in differing.items()]
+    pairs = []
+    for key, values in differing.items():
+        before, after = ("not set" if value is None else str(value) if not isinstance(value, dict)
+                         else "a table over time" if "table" in value else "a section"
+                         for value in values)
+        pairs.append(f"{key.removeprefix('tables.')} ({before} {earlier}, now {after})")
     more = f" and {len(pairs) - MOST_DESCRIBED} more" if len(pairs) > MOST_DESCRIBED else ""
     return ", ".join(pairs[:MOST_DESCRIBED]) + more
-
-
-def _text(value: object) -> str:
-    if isinstance(value, dict):
-        return "a table over time" if "table" in value else "a section"
-    return "not set" if value is None else str(value)
 
 
 def resume(folder: str | Path, overrides: Collection[str] = (),
@@ -179,20 +177,27 @@ def resume(folder: str | Path, overrides: Collection[str] = (),
     """Resume the run in a folder, or make it longer; returns how it ended.
 
     The arguments and errors are those of :func:`repro.resume` and :func:`run`. A warning is issued
-    if package versions have changed or a checkpoint cannot be used.
+    if package versions or the file of the scene have changed or a checkpoint cannot be used.
     """
     folder = Path(folder)
     refuse_null(folder)
-    if not is_file(folder / PROVENANCE):
+    file = folder / PROVENANCE
+    if not is_file(file):
         raise OutputError(f"{folder}: there is no run.json; the folder of a run is needed")
     with locked(folder, watch.patience):
         record = read_record(folder)
         run_files = list_written_files(folder, record)
         refuse_links(folder, run_files)
-        scene = parse_scene(record["tables"], record["scene"], str(folder / PROVENANCE))
+        scene = parse_scene(record["tables"], record["scene"], str(file))
         recorder = Recorder(scene, folder, run_files, record["origin"])
-        _warn_changed_file(recorder, watch)
-        extended = _extended_scene(scene, overrides, str(folder / PROVENANCE))
+        origin = recorder.origin
+        with suppress(SceneError):  # the file is missing or no longer a scene
+            current = load_scene(origin.get("file", scene), origin.get("set", ()),
+                                 unset=origin.get("unset", ()))
+            if differing := differences(scene_tables(scene), scene_tables(current)):
+                watch.warn(f"{origin['file']}: it has changed since the run began: "
+                           f"{_describe(differing)}; the run continues with its own scene")
+        extended = _extended_scene(scene, overrides, str(file))
         if extended == scene:
             return _continue(recorder, record, watch)
         return _extend(recorder, extended, overrides, record, watch)
@@ -232,23 +237,27 @@ def _extend(recorder: Recorder, extended: Scene, overrides: Collection[str], rec
     return _record_run(recorder, steps(extended, recorder.state), watch)
 
 
-def _warn_changed_file(recorder: Recorder, watch: Watch) -> None:
-    """Warn if the file from which the scene was read has changed since."""
-    origin = recorder.origin
-    if "file" not in origin:
-        return
-    with suppress(SceneError):  # the file is missing or no longer a scene
-        current = load_scene(origin["file"], origin.get("set", ()), unset=origin.get("unset", ()))
-        differing = differences(scene_tables(recorder.scene), scene_tables(current))
-        if differing:
-            watch.warn(f"{origin['file']}: it has changed since the run began: "
-                       f"{_describe(differing)}; the run continues with its own scene")
-
-
 def _continue(recorder: Recorder, record: dict, watch: Watch) -> str:
-    """Continue the run of this ``run.json`` unless it has finished; return how it ended."""
-    if is_over(record["status"]) and _is_unchanged(recorder, record, watch):
-        return _complete_finished_run(recorder, record, watch)
+    """Continue the run of this ``run.json``; return how it ended.
+
+    A finished run whose files are unchanged is left as it is; if it was killed before, its page is
+    written and its checkpoints are removed. Raises OutputError if files have changed and there is
+    no checkpoint from which to resume.
+    """
+    folder = recorder.folder
+    if is_over(record["status"]):
+        damage = find_damage(folder, record)
+        if not damage:
+            has_checkpoint = any((folder / name).exists() for name in CHECKPOINTS)
+            if has_checkpoint or REPORT not in record["sha256"] or not is_file(folder / REPORT):
+                complete_folder(folder, record, recorder.run_files)
+            watch.tell({"event": "end", "scene": recorder.scene.name, "status": record["status"],
+                        "folder": str(folder), "changed": False})
+            return record["status"]
+        if not any(is_file(folder / name) for name in checkpoint.STATES):
+            raise OutputError(f"{damage}; there is no checkpoint to resume from; run the scene "
+                              "again with --force")
+        watch.warn(f"{damage}; the run resumes from its checkpoint")
     if not _restore(recorder, recorder.scene, record, watch):
         return _run_from_start(recorder, watch)
     recorder.write_record(RUNNING)
@@ -256,36 +265,46 @@ def _continue(recorder: Recorder, record: dict, watch: Watch) -> str:
     return _record_run(recorder, steps(recorder.scene, recorder.state), watch)
 
 
-def _is_unchanged(recorder: Recorder, record: dict, watch: Watch) -> bool:
-    """Return whether all files of a finished run are unchanged.
+def _restore(recorder: Recorder, scene: Scene, record: dict, watch: Watch) -> bool:
+    """Restore the recorder to continue as the run of a scene, and record the resume.
 
-    Raises OutputError if they are not and there is no checkpoint from which to resume.
+    It takes the first valid checkpoint, and warns of each refused one. Returns False if the run
+    starts again from t = 0.
     """
-    damage = find_damage(recorder.folder, record)
-    if damage and not any(is_file(recorder.folder / name) for name in checkpoint.STATES):
-        raise OutputError(f"{damage}; there is no checkpoint to resume from; run the scene again "
-                          "with --force")
-    if damage:
-        watch.warn(f"{damage}; the run resumes from its checkpoint")
-    return not damage
-
-
-def _complete_finished_run(recorder: Recorder, record: dict, watch: Watch) -> str:
-    """Report a finished run; write its page and remove its checkpoints if it was killed before."""
+    _require(scene, watch)
+    timing.reset()
     folder = recorder.folder
-    has_checkpoint = any((folder / name).exists() for name in CHECKPOINTS)
-    if has_checkpoint or REPORT not in record["sha256"] or not is_file(folder / REPORT):
-        complete_folder(folder, record, recorder.run_files)
-    watch.tell({"event": "end", "scene": recorder.scene.name, "status": record["status"],
-                "folder": str(folder), "changed": False})
-    return record["status"]
+    changed = _find_changes(record, recorder, watch)
+    names: tuple[str, ...] = checkpoint.STATES
+    if scene != recorder.scene:
+        changed[END] = [f"{each.growth.end:g} h" for each in (recorder.scene, scene)]
+        names = (checkpoint.LAST,) if recorder.has_last_state else names
+    is_restored = False
+    with folder_errors(folder):
+        remove_temporary(folder)
+        for path in (folder / name for name in names):
+            if is_restored or not path.exists():
+                continue
+            try:
+                recorder.restore(path)
+                is_restored = True
+            except CheckpointError as error:
+                path.replace(folder / checkpoint.REFUSED)
+                watch.warn(f"{path}: refused: {error}; renamed to {checkpoint.REFUSED}")
+    if not is_restored:
+        watch.warn(f"{folder}: no checkpoint to resume from; the run starts again from t = 0")
+    elif not same_rows(recorder.scene, scene, recorder.time):
+        recorder.forget()  # a longer run has rows at other times
+        is_restored = False
+    recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
+    return is_restored
 
 
 def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
     """Find changes since the run began that could change its numbers, and warn of them."""
     before = {key: record[key] for key in ("versions", "conditions")}
-    versions = results.provenance(recorder.scene)["versions"]
-    after = {"versions": versions, "conditions": conditions()}
+    after = {"versions": results.provenance(recorder.scene)["versions"],
+             "conditions": conditions()}
     changed = {key: pair for key, pair in differences(before, after).items()
                if not key.startswith("conditions.threads")}
     if changed:
@@ -293,43 +312,6 @@ def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, l
                    f"{_describe(changed, 'before')}; the results may differ from those of an "
                    "uninterrupted run")
     return changed
-
-
-def _restore(recorder: Recorder, scene: Scene, record: dict, watch: Watch) -> bool:
-    """Restore the recorder to continue as the run of a scene, and record the resume.
-
-    Returns False if the run starts again from t = 0.
-    """
-    _require(scene, watch)
-    timing.reset()
-    changed = _find_changes(record, recorder, watch)
-    names: tuple[str, ...] = checkpoint.STATES
-    if scene != recorder.scene:
-        changed[END] = [f"{each.growth.end:g} h" for each in (recorder.scene, scene)]
-        names = (checkpoint.LAST,) if recorder.has_last_state else names
-    with folder_errors(recorder.folder):
-        remove_temporary(recorder.folder)
-        is_restored = _read_checkpoint(recorder, names, watch)
-    if is_restored and not same_rows(recorder.scene, scene, recorder.time):
-        recorder.forget()  # a longer run has rows at other times
-        is_restored = False
-    recorder.history.resumes.append({"time_h": recorder.time, "changed": changed})
-    return is_restored
-
-
-def _read_checkpoint(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
-    """Restore the recorder from the first valid checkpoint; warn of each refused one."""
-    for name in names:
-        path = recorder.folder / name
-        if path.exists():
-            try:
-                recorder.restore(path)
-                return True
-            except CheckpointError as error:
-                path.replace(recorder.folder / checkpoint.REFUSED)
-                watch.warn(f"{path}: refused: {error}; renamed to {checkpoint.REFUSED}")
-    watch.warn(f"{recorder.folder}: no checkpoint to resume from; the run starts again from t = 0")
-    return False
 
 
 def _run_from_start(recorder: Recorder, watch: Watch) -> str:
@@ -409,13 +391,26 @@ def _record_steps(recorder: Recorder, run_steps: ReportedSteps, watch: Watch) ->
         _emit_warnings(recorder.find_crease(), watch)
         if not recorder.has_last_state and ends_soon(recorder.scene, state):
             recorder.save_last_state()
-        if recorder.steps > steps_before:  # no row within a step
-            _emit_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
+        events = {"step": recorder.steps > steps_before, "remesh": recorder.remeshes > remeshes,
+                  "contact": recorder.contact > contact}
+        for event in events if events["step"] else ():  # no row within a step
+            if events[event]:
+                watch.tell({"event": event, "time_h": recorder.time, "end_h": recorder.end,
+                            "step": recorder.steps, "remeshes": recorder.remeshes,
+                            "contact": recorder.contact})
         if number := watch.stop():
             raise interruption(recorder, number)
         if perf_counter() - saved_at >= watch.interval:
             _checkpoint(recorder, watch)
             saved_at = perf_counter()
+
+
+def _checkpoint(recorder: Recorder, watch: Watch) -> None:
+    start = perf_counter()
+    recorder.save(RUNNING)
+    file = str(recorder.folder / checkpoint.NEWEST)
+    watch.tell({"event": "checkpoint", "time_h": recorder.time, "file": file,
+                "seconds": perf_counter() - start})
 
 
 def _warn(recorder: Recorder, scene: Scene, velocity: float | None, watch: Watch) -> None:
@@ -431,23 +426,5 @@ def _warn(recorder: Recorder, scene: Scene, velocity: float | None, watch: Watch
 
 def _emit_warnings(scene_warnings: list[Caveat], watch: Watch) -> None:
     for warning in scene_warnings:
-        message = f"{warning.key}: {warning.text}"
-        watch.tell({"event": "warning", "key": warning.key, "message": message})
-
-
-def _emit_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:
-    """Emit the events of a step."""
-    state = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps,
-           "remeshes": recorder.remeshes, "contact": recorder.contact}
-    watch.tell({"event": "step", **state})
-    for event, happened in (("remesh", remeshed), ("contact", contact)):
-        if happened:
-            watch.tell({"event": event, **state})
-
-
-def _checkpoint(recorder: Recorder, watch: Watch) -> None:
-    start = perf_counter()
-    recorder.save(RUNNING)
-    file = str(recorder.folder / checkpoint.NEWEST)
-    watch.tell({"event": "checkpoint", "time_h": recorder.time, "file": file,
-                "seconds": perf_counter() - start})
+        watch.tell({"event": "warning", "key": warning.key,
+                    "message": f"{warning.key}: {warning.text}"})

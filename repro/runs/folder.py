@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from repro.errors import OutputError, printable
+from repro.results.field_files import NAME as FIELDS
 from repro.results.files import MOST_TABLE, WRITING, is_file, is_folder, read
 from repro.runs.checkpoint import LAST, REFUSED, STATES
 
@@ -32,7 +33,6 @@ RUN_FILES = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_e
              REPORT, *CHECKPOINTS, LAST)
 #: Further files that the runs of earlier versions have written.
 FORMER_FILES = ("timeseries.nc",)
-FIELDS = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 #: A line of SUMS, in the format of sha256sum.
 SUM = re.compile(rf"([0-9a-f]{{64}})  ({FIELDS.pattern})")
 #: A temporary folder of a file that is being written, and the names of files in it.
@@ -126,21 +126,15 @@ def remove(folder: Path, names: Collection[str]) -> None:
 
 
 def remove_temporary(folder: Path) -> None:
-    """Remove the temporary files of a run that was killed."""
+    """Remove the temporary files of a run that was killed, and their folders if then empty."""
     folders = [folder, folder / "fields"] if is_folder(folder / "fields") else [folder]
-    for parent in folders:
-        for temporary in parent.glob(WRITING + "*"):
-            if TEMPORARY_FOLDER.fullmatch(temporary.name) and is_folder(temporary):
-                _remove_temporary(temporary)
-
-
-def _remove_temporary(temporary: Path) -> None:
-    """Remove the files of a run in a temporary folder, and the folder if it is then empty."""
-    for file in temporary.iterdir():
-        if FILE_NAME.fullmatch(file.name) and is_file(file):
-            file.unlink()
-    with suppress(OSError):  # it contains another file
-        temporary.rmdir()
+    for temporary in (path for parent in folders for path in parent.glob(WRITING + "*")):
+        if TEMPORARY_FOLDER.fullmatch(temporary.name) and is_folder(temporary):
+            for file in temporary.iterdir():
+                if FILE_NAME.fullmatch(file.name) and is_file(file):
+                    file.unlink()
+            with suppress(OSError):  # it contains another file
+                temporary.rmdir()
 
 
 def refuse_null(folder: Path) -> None:
@@ -151,14 +145,13 @@ def refuse_null(folder: Path) -> None:
 
 
 @contextmanager
-def folder_errors(folder: Path, kind: type[OutputError] = OutputError) -> Iterator[None]:
-    """Convert errors of the file system into an OutputError of a kind, for the folder."""
+def folder_errors(folder: Path) -> Iterator[None]:
+    """Convert errors of the file system into OutputError for the folder."""
     try:
         yield
     except OSError as error:
-        reason = error.strerror or error
-        expected = "a folder that can be written is needed"
-        raise kind(f"--out {folder}: {reason}; {expected}") from error
+        raise OutputError(f"--out {folder}: {error.strerror or error}; a folder that can be "
+                          "written is needed") from error
 
 
 @contextmanager
@@ -196,31 +189,25 @@ def locked(folder: Path, patience: float = 0.0) -> Iterator[None]:
     """
     from filelock import FileLock, SoftFileLock, Timeout  # its import takes a twentieth of a second
 
+    path = folder / LOCK
     lock = FileLock(folder / LOCK, timeout=max(patience, TAKE_OVER))
     with folder_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        _refuse_another_lock(folder / LOCK)
+        is_lock = is_file(path) and (path.stat().st_size == 0 or SoftFileLock(path).pid is not None)
+        if os.path.lexists(path) and not is_lock:
+            raise FileExistsError(errno.EEXIST, f"{LOCK} exists and is not a lock")
         try:
             with warnings.catch_warnings(action="ignore"):  # there is no flock
                 lock.acquire()
         except Timeout:
             advice = "wait for its end, or give another folder"
             if isinstance(lock, SoftFileLock):
-                advice += f"; if no process writes there, remove {folder / LOCK}"
+                advice += f"; if no process writes there, remove {path}"
             raise OutputError(f"--out {folder}: another process is writing there; "
                               f"{advice}") from None
     try:
         yield
     finally:
         with suppress(OSError):
-            (folder / LOCK).unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
         lock.release()
-
-
-def _refuse_another_lock(path: Path) -> None:
-    """Raise OSError if the path of the lock is a file with other content, or no regular file."""
-    from filelock import SoftFileLock
-
-    is_lock = is_file(path) and (path.stat().st_size == 0 or SoftFileLock(path).pid is not None)
-    if os.path.lexists(path) and not is_lock:
-        raise FileExistsError(errno.EEXIST, f"{path.name} exists and is not a lock")

@@ -67,8 +67,8 @@ def fields_name(kind: str, number: int) -> str:
 
 def restore_history(plain: dict) -> History:
     """Restore a History from ``vars(history)`` after a round trip through JSON."""
-    lists = ("index", "before", "missing")
-    return History(**plain | {name: list(map(tuple, plain.get(name, ()))) for name in lists})
+    pairs = {name: list(map(tuple, plain.get(name, ()))) for name in ("index", "before", "missing")}
+    return History(**plain | pairs)
 
 
 def require_fields(folder: Path, history: History) -> None:

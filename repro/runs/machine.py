@@ -6,6 +6,7 @@ import hashlib
 import os
 import platform
 import re
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -72,31 +73,24 @@ def _without_remark(match: re.Match) -> str:
     text = match[0]
     if text.startswith("#"):
         return ""
-    source = match.string
-    start = source.rfind("\n", 0, match.start()) + 1
-    fills = source[start:match.start()].isspace() or start == match.start()
-    end = source.find("\n", match.end())
-    fills = fills and not source[match.end():end].strip()
-    return "..." if fills and text.startswith('"""') else text
+    before = match.string[:match.start()].rpartition("\n")[2]
+    after = match.string[match.end():].partition("\n")[0]
+    return "..." if text.startswith('"""') and not (before + after).strip() else text
 
 
 def conditions() -> dict:
     """Conditions of a run, for ``run.json``; equal conditions give equal bits."""
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
+    optional = {}
+    for name in OPTIONAL.values():
+        with suppress(PackageNotFoundError):
+            optional[name] = version(name)
     return {"system": platform.system(), "machine": platform.machine(),
             "libc": " ".join(platform.libc_ver()), "blas": f"{blas['name']} {blas['version']}",
             "simd": built["SIMD Extensions"].get("found", []),
-            "geos": shapely.geos_version_string, "source": source_hash(),
-            "optional": {name: number for name in OPTIONAL.values() if (number := _version(name))},
+            "geos": shapely.geos_version_string, "source": source_hash(), "optional": optional,
             "threads": {name: os.environ[name] for name in THREADS if name in os.environ}}
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def differences(before: dict, after: dict) -> dict[str, list]:

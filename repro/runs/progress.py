@@ -14,7 +14,6 @@ from contextlib import contextmanager, nullcontext
 from functools import partial
 from threading import Event, Thread
 from time import monotonic
-from typing import TextIO
 
 from repro.errors import OutputError, printable
 from repro.polling import polling
@@ -51,16 +50,11 @@ def say(text: str, *, to_stderr: bool = False) -> None:
     try:
         print(text.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
     except OSError as error:
-        _discard_output(stream)
+        null_device = os.open(os.devnull, os.O_WRONLY)  # for buffered and further output
+        os.dup2(null_device, stream.fileno())
+        os.close(null_device)
         if not to_stderr and not isinstance(error, BrokenPipeError):
             raise OutputError(f"standard output: {error.strerror or error}") from error
-
-
-def _discard_output(stream: TextIO) -> None:
-    """Discard all buffered and further output of a stream."""
-    null_device = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null_device, stream.fileno())
-    os.close(null_device)
 
 
 def in_json(event: dict) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -100,19 +101,28 @@ class Recorder:
 
     def add(self, state: RestartState, reported: Report | None) -> None:
         """Add one step: the state after it and, if it is reported, its row and fields."""
+        history = self.history
         if reported:
-            self._add_fields(reported)
+            self._write_fields(history.index, "fields", reported.pore, reported.solved)
+            if reported.before and self.scene.requested_times:
+                self._write_fields(history.before, "before_expansion", *reported.before)
             row = results.row(self.scene, reported)
-            self.history.rows.append(list(row.values()))
-            self.history.ledgers += self._ledger_rows(reported.ledgers)
-            self.history.remeshes += int(reported.remeshes)
-            self.history.iterations = sum_counts(self.history.iterations, reported.iterations)
-            self.history.departed += reported.departed
-        if state.missing and state.missing not in self.history.missing:  # not before a resume
-            self.history.missing.append(state.missing)
+            history.rows.append(list(row.values()))
+            history.ledgers += self._ledger_rows(reported.ledgers)
+            history.remeshes += int(reported.remeshes)
+            history.iterations = sum_counts(history.iterations, reported.iterations)
+            history.departed += reported.departed
+        if state.missing and state.missing not in history.missing:  # not before a resume
+            history.missing.append(state.missing)
         if self.state and state.step_control != self.state.step_control:
             self._count_missed_tolerance(state.step_control)
         self.state = state
+
+    def _count_missed_tolerance(self, step_control: StepControl) -> None:
+        """Count the last step if it misses the tolerance."""
+        if exceeds_tolerance(step_control, self.scene.numerics.tolerance):
+            self.history.missed += 1
+            self.history.worst = max(self.history.worst, step_control.estimate)
 
     def _ledger_rows(self, ledgers: Iterable[Ledger]) -> list[list[float]]:
         return [results.ledger_row(self.scene, ledger) for ledger in ledgers]
@@ -124,34 +134,21 @@ class Recorder:
         self.history.surface += map(asdict, new)
         return new
 
-    def _count_missed_tolerance(self, step_control: StepControl) -> None:
-        """Count the last step if it misses the tolerance."""
-        if exceeds_tolerance(step_control, self.scene.numerics.tolerance):
-            self.history.missed += 1
-            self.history.worst = max(self.history.worst, step_control.estimate)
-
     def warnings_so_far(self) -> list[Caveat]:
         """Warn if any step so far misses the tolerance, if any row is missing or an aggregate has
         left, and of each simplification that holds at t = 0 and not at the present size."""
-        count = f" in {self.history.missed} of {self.steps} steps"
-        return [*warn_missed_tolerance(self.scene, self.history.worst, count),
-                *warn_missing_rows(self.history.missing),
-                *(Caveat("growth.after_detachment", text) for text in self.history.departed),
-                *self._warn_of_growth()]
-
-    def _warn_of_growth(self) -> list[Caveat]:
-        if self.scene.growth is None or not (self.state and self.history.rows):
-            return []
-        with suppress(ArithmeticError):  # the warnings at t = 0 report it
-            earlier = {warning["key"] for warning in self.history.warnings}
-            later = find_warnings(self.scene, self.first_velocity, reached(self.state.pore))
-            return [each for each in later if each.key not in earlier]
-        return []
-
-    def _add_fields(self, reported: Report) -> None:
-        self._write_fields(self.history.index, "fields", reported.pore, reported.solved)
-        if reported.before and self.scene.requested_times:
-            self._write_fields(self.history.before, "before_expansion", *reported.before)
+        history = self.history
+        of_growth: list[Caveat] = []
+        if self.scene.growth and self.state and history.rows:
+            earlier = {warning["key"] for warning in history.warnings}
+            with suppress(ArithmeticError):  # the warnings at t = 0 report it
+                later = find_warnings(self.scene, self.first_velocity, reached(self.state.pore))
+                of_growth = [each for each in later if each.key not in earlier]
+        count = f" in {history.missed} of {self.steps} steps"
+        return [*warn_missed_tolerance(self.scene, history.worst, count),
+                *warn_missing_rows(history.missing),
+                *(Caveat("growth.after_detachment", text) for text in history.departed),
+                *of_growth]
 
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
         name = fields_name(kind, len(index))
@@ -159,22 +156,19 @@ class Recorder:
         with file_errors(path), atomic_path(path) as beside:
             field_files.write(beside, results.fields(self.scene, pore, solved))
             self.history.hashes[name] = sha256_of(beside)
-            self._list_fields(name)
+            # listed as written by this run before the file exists
+            with claim(self.folder, SUMS, self.run_files).open("a", encoding="utf-8",
+                                                               newline="") as sums:
+                sums.write(sum_line(name, self.history.hashes[name]))
         index.append((pore.time, name))
         self.unsynced.append(name)
-
-    def _list_fields(self, name: str) -> None:
-        """List a file of fields as written by this run, before the file exists."""
-        path = claim(self.folder, SUMS, self.run_files)
-        with path.open("a", encoding="utf-8", newline="") as sums:
-            sums.write(sum_line(name, self.history.hashes[name]))
 
     def save(self, status: str) -> dict:
         """Write the checkpoint, tables, indices and ``run.json``; return the last one.
         """
         history = self.history
         if self.state and not is_over(status):
-            self._write_checkpoint(self.state)
+            self._write_checkpoint()
         self._write("timeseries.csv", results.write_table, results.column_names(self.scene),
                     history.rows)
         self._write("fields.pvd", results.write_index, history.index)
@@ -195,24 +189,25 @@ class Recorder:
         history = self._current_history()
         warnings = [*history.warnings, *history.surface, *map(asdict, self.warnings_so_far())]
         files = self._files(is_over(status))
+        hashed = set() if status == RUNNING else \
+            set(files) - history.hashes.keys() - {PROVENANCE, REPORT, *CHECKPOINTS}
         record = {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,
             "files": files, **{count.name: count.value(history) for count in COUNTS},
             "resumes": history.resumes, "warnings": warnings, "origin": self.origin,
-            "sha256": {} if status == RUNNING else self._hashes(files)}
+            "sha256": {name: sha256_of(self.folder / name) for name in sorted(hashed)
+                       if is_file(self.folder / name)}}
         self._write(PROVENANCE, results.write_sealed, record)
         return record
-
-    def _hashes(self, files: list[str]) -> dict[str, str]:
-        """SHA-256 of these files, except fields, checkpoints, the page and ``run.json``."""
-        names = set(files) - self.history.hashes.keys() - {PROVENANCE, REPORT, *CHECKPOINTS}
-        return {name: sha256_of(self.folder / name) for name in sorted(names)
-                if is_file(self.folder / name)}
 
     def _files(self, finished: bool) -> list[str]:
         """Names of the run's files: the existing ones, or all possible ones until it has finished.
         """
-        names = set(RUN_FILES) - _unwritten_files(self.scene)
+        names = set(RUN_FILES)
+        if self.scene.growth is None:
+            names -= {"ledger.csv", checkpoint.LAST}
+        if not self.scene.requested_times:
+            names.remove("before_expansion.pvd")
         if finished:
             existing = {name for name in names if is_file(self.folder / name)}
             names = (existing | {REPORT}) - set(CHECKPOINTS)
@@ -225,9 +220,12 @@ class Recorder:
 
     def save_last_state(self) -> None:
         """Save the present state as the one from which a longer run resumes."""
-        history = self._current_history()
-        content = checkpoint.encode(*pack_checkpoint(self.scene, self.state, history))
-        self._write(checkpoint.LAST, Path.write_bytes, content)
+        self._write(checkpoint.LAST, Path.write_bytes, self._packed())
+
+    def _packed(self) -> bytes:
+        """The content of a checkpoint of the present state and history."""
+        plain, arrays = state_arrays.pack_state(self.scene, self.state)
+        return checkpoint.encode({"state": plain, "record": vars(self._current_history())}, arrays)
 
     def extend(self, scene: Scene, changes: list[str], ends_soon: bool) -> None:
         """Continue as the recorder of a longer run. Its checkpoint is written before ``run.json``.
@@ -237,7 +235,7 @@ class Recorder:
         """
         self.scene = scene
         self.origin["set"] = changes
-        self._write_checkpoint(self.state)
+        self._write_checkpoint()
         if ends_soon:
             self.save_last_state()
         else:
@@ -256,19 +254,17 @@ class Recorder:
 
     def _current_history(self) -> History:
         """The history with the wall time so far, including the time before a resume."""
-        before = self.history
-        names = sorted(before.stages.keys() | timing.seconds.keys())
-        stages = {name: before.stages.get(name, 0.0) + timing.seconds.get(name, 0.0)
-                  for name in names}
-        seconds = before.seconds + perf_counter() - self.started
-        return replace(before, seconds=seconds, stages=stages)
+        stages = Counter(self.history.stages)
+        stages.update(timing.seconds)
+        seconds = self.history.seconds + perf_counter() - self.started
+        return replace(self.history, seconds=seconds, stages=dict(sorted(stages.items())))
 
-    def _write_checkpoint(self, state: RestartState) -> None:
+    def _write_checkpoint(self) -> None:
         for name in self.unsynced:
             with file_errors(self.folder / name):
                 checkpoint.sync_to_disk(self.folder / name)
         self.unsynced = []
-        content = checkpoint.encode(*pack_checkpoint(self.scene, state, self._current_history()))
+        content = self._packed()
         claim(self.folder, checkpoint.PREVIOUS, self.run_files)
         with file_errors(claim(self.folder, checkpoint.NEWEST, self.run_files)):
             checkpoint.write(self.folder, content)
@@ -312,20 +308,6 @@ class Recorder:
         fields_text = f"; fields of t = {index[-1][0]:g} h: {index[-1][1]}" if index else ""
         path = self.folder / checkpoint.NEWEST
         return f"the last good state, t = {self.state.pore.time:g} h, is in {path}{fields_text}"
-
-
-def pack_checkpoint(scene: Scene, state: RestartState,
-                    history: History) -> tuple[dict, checkpoint.Arrays]:
-    """Pack a state and a history for a checkpoint."""
-    state_values, arrays = state_arrays.pack_state(scene, state)
-    return {"state": state_values, "record": vars(history)}, arrays
-
-
-def _unwritten_files(scene: Scene) -> set[str]:
-    """Names of the optional files that a run of this scene does not write."""
-    optional = {"ledger.csv": scene.growth is None, checkpoint.LAST: scene.growth is None,
-                "before_expansion.pvd": not scene.requested_times}
-    return {name for name, is_absent in optional.items() if is_absent}
 
 
 def _write_sums(path: Path, hashes: dict[str, str]) -> None:

@@ -16,7 +16,8 @@ from repro.march.state import RestartState
 from repro.report import fields, reading
 from repro.results import field_files, provenance
 from repro.results.files import sha256_of
-from repro.results.tables import Results, arrays, fields_at
+from repro.results.quantities import none_if_nan
+from repro.results.tables import Results, fields_at
 from repro.runs import checkpoint, execution
 from repro.runs.execution import Watch, issue_warnings, origin_of
 from repro.runs.folder import PROVENANCE, read_sums
@@ -182,7 +183,7 @@ def load_run(folder: str | Path) -> Results:
     reading.require_columns(run)
     reading.require_lists(run)
     listed_fields = dict(fields.listed_files(run.folder))
-    rows = [dict(zip(run.series, map(_none_if_nan, values)))
+    rows = [dict(zip(run.series, map(none_if_nan, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed_fields)
     return Results(run.record["scene"], rows, files, run.record["status"], Path(folder),
@@ -207,11 +208,6 @@ def _saved_states(scene: Scene, path: Path) -> Iterator[RestartState]:
     with suppress(CheckpointError):
         plain, saved = checkpoint.read_checkpoint(path)
         yield unpack_state(scene, plain["state"], saved)
-
-
-def _none_if_nan(value: float) -> float | None:
-    """Replace NaN in a table by None."""
-    return None if np.isnan(value) else value
 
 
 class _Files(Sequence[dict[str, np.ndarray]]):
@@ -246,4 +242,4 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         if sha256_of(path) != self.sums.get(f"fields/{path.name}"):
             raise OutputError(f"{path}: the fields are cut short or altered since they were "
                               "written")
-        return arrays(field_files.read(path))
+        return field_files.read(path).arrays

@@ -42,8 +42,8 @@ def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     arrays["region"] = pore.mesh.topology.region
     arrays["pressure"] = pore.pressure
     for number, (body, loop) in enumerate(zip(pore.bodies, pore.mesh.topology.loops)):
-        own = {"loop": loop, **_body_arrays(body)}
-        arrays |= {f"{name}{_ending(number)}": array for name, array in own.items()}
+        of_body = {"loop": loop, **_body_arrays(body)}
+        arrays |= {f"{name}{_ending(number)}": array for name, array in of_body.items()}
     if guess:
         fields = {name: getattr(guess, name) for name in OF_GUESS}
         arrays |= {name: field for name, field in fields.items() if field is not None}
@@ -79,16 +79,12 @@ def unpack_state(scene: Scene, plain: dict, arrays: Arrays) -> RestartState:
     """Invert :func:`pack_state`. Raises CheckpointError if the state is of another scene."""
     if plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
-    ledgers = tuple(map(_ledger, plain["ledgers"]))
+    pairs: list[list[Any]] = [[tuple(part) if isinstance(part, list) else part for part in parts]
+                              for parts in plain["ledgers"]]  # JSON has lists for pairs
+    ledgers = tuple(Ledger(*parts) for parts in pairs)
     step_control = StepControl(**plain["pace"])
     return RestartState(_pore(scene, plain, arrays), step_control, ledgers, plain["remeshes"],
                         plain["iterations"], plain["row_h"], Compression(*plain["compression"]))
-
-
-def _ledger(parts: list) -> Ledger:
-    """A ledger from its fields; JSON has lists for the pairs of acceptor and donor."""
-    values: list[Any] = [tuple(part) if isinstance(part, list) else part for part in parts]
-    return Ledger(*values)
 
 
 def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:

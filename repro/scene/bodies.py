@@ -17,7 +17,7 @@ def labels(names: Sequence[object]) -> list[str]:
             for k, name in enumerate(names)]
 
 
-def places(names: Sequence[object]) -> list[str]:
+def dotted_keys(names: Sequence[object]) -> list[str]:
     """The dotted key of each body's table."""
     return [SECTION] if len(names) == 1 else [f"{SECTION}.{label}" for label in labels(names)]
 
@@ -42,36 +42,41 @@ def path_of(tables: dict, key: str) -> list:
     """Keys and places of lists that lead to a dotted key in the tables of a scene."""
     section, *below = key.split(".")
     bodies = tables.get(section, {})
-    if section != SECTION or not below or not isinstance(bodies, dict | list):
-        return [section, *below]
-    place = place_of(bodies, below[0])
+    place = None
+    if section == SECTION and below and isinstance(bodies, dict | list):
+        place = place_of(bodies, below[0])
     if place is None:
         return [section, *below]
-    return [section, *below[1:]] if isinstance(bodies, dict) else [section, place, *below[1:]]
+    return [section, *([] if isinstance(bodies, dict) else [place]), *below[1:]]
 
 
 def canonical(tables: dict, key: str) -> str:
     """A dotted key with the body's own label, as messages write it."""
     section, *below = path_of(tables, key)
-    if not below or not isinstance(below[0], int):
-        return ".".join([section, *below])
-    return ".".join([section, labels(_names(tables[section]))[below[0]], *below[1:]])
+    if below and isinstance(below[0], int):
+        below[0] = labels(_names(tables[section]))[below[0]]
+    return ".".join([section, *below])
 
 
-def refuse_unaddressed(tables: dict, key: str, stated: str) -> None:
-    """Raise SceneError if a dotted key belongs to one of several bodies and does not say to which.
+def refuse_unaddressed(tables: dict, key: str, stated: str, known: Sequence[str]) -> None:
+    """Raise SceneError if a dotted key belongs to an aggregate that the scene does not have, or to
+    one of several and does not say to which.
 
-    stated: the entry in a message.
+    stated: the entry in a message; known: all dotted keys.
     """
     section, *below = key.split(".")
     bodies = tables.get(section)
-    if section == SECTION and below and isinstance(bodies, list) \
-            and place_of(bodies, below[0]) is None:
-        accepted = places(_names(bodies))
-        keys = [part for part in below[1:] or below if not part.isdigit()]
-        example = ".".join([accepted[0], *keys])
+    if section != SECTION or not below or place_of(bodies, below[0]) is not None:
+        return
+    accepted = dotted_keys(_names(bodies))
+    keys = [part for part in below[1:] or below if not part.isdigit()]
+    example = ".".join([accepted[0], *keys])
+    if isinstance(bodies, list):
         raise SceneError(f"{stated}: the scene has {len(bodies)} aggregates, "
                          f"{', '.join(accepted)}; one of them is needed, such as {example}")
+    if isinstance(bodies, dict) and len(below) > 1 and f"{SECTION}.{below[0]}" not in known:
+        raise SceneError(f"{stated}: the scene has one aggregate, without this name; {example} is "
+                         "its key, and several aggregates are tables [[aggregate]]")
 
 
 def single(tables: dict) -> dict:

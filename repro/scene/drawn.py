@@ -8,10 +8,10 @@ import csv
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from repro.scene.needed import package
 from repro.scene.rules import FINEST
 from repro.scene.units import MOST_POINTS, Drawn, Refused
 
@@ -105,9 +105,9 @@ def _mask(drawn: Drawn, width: float) -> Shape:
     from shapely import box, unary_union
 
     try:
-        images = import_module(PILLOW)
-    except ImportError:
-        raise Refused("the package pillow is not installed; pip install pillow") from None
+        images = package(PILLOW, "pillow")
+    except ImportError as error:
+        raise Refused(str(error)) from None
     with images.open(drawn.file, formats=["PNG"]) as image:
         if image.width * image.height > MOST_PIXELS:
             raise Refused(f"{drawn.file}: more than {MOST_PIXELS} pixels")
@@ -136,7 +136,11 @@ READERS: dict[str, Callable[[Drawn, float], Shape]] = {
 
 
 def _on_wall(shape: Shape, wall: str, width: float) -> tuple[tuple[float, float], ...]:
-    """The line around a polygon from the upstream to the downstream end on its wall."""
+    """The line around a polygon from the upstream to the downstream end on its wall.
+
+    A line of pixels is smoothed: it is at most a pixel away from theirs, and contact stays.
+    """
+    from shapely import LineString
     from shapely.geometry.polygon import orient
 
     if not shape.polygon.is_valid or not shape.polygon.area > 0:
@@ -148,28 +152,22 @@ def _on_wall(shape: Shape, wall: str, width: float) -> tuple[tuple[float, float]
     if low < -near or high > width + near:
         raise Refused(f"a polygon in the pore, y from 0 to {width:g} um, is needed; with this "
                       f"um_per_unit it is from {low:g} to {high:g} um")
-    levels = {0.0: abs, width: lambda y: abs(y - width)}
-    ring = [(x, next((level for level, far in levels.items() if far(y) <= near), y))
+    own_level, opposite = (0.0, width) if wall == "lower" else (width, 0.0)
+    ring = [(x, next((level for level in (0.0, width) if abs(y - level) <= near), y))
             for x, y in orient(shape.polygon).exterior.coords[:-1]]
-    own = [y == (0.0 if wall == "lower" else width) for _, y in ring]
-    leaves = [k for k in range(len(ring)) if own[k] and not own[(k + 1) % len(ring)]]
-    if len(leaves) != 1 or sum(own) < 2:
+    on_wall = [y == own_level for _, y in ring]
+    leaves = [k for k in range(len(ring)) if on_wall[k] and not on_wall[(k + 1) % len(ring)]]
+    if len(leaves) != 1 or sum(on_wall) < 2:
         raise Refused(f"one side of the polygon on its wall ({WALLS[wall]}) is needed; it touches "
                       f"the wall in {len(leaves)} places")
     ring = ring[leaves[0]:] + ring[:leaves[0]]
-    own = own[leaves[0]:] + own[:leaves[0]]
-    line = ring[:own.index(True, 1) + 1]
+    end = next(k for k, (_, y) in enumerate(ring) if k and y == own_level)
+    line = ring[:end + 1]
     line = line if wall == "upper" else line[::-1]
-    return tuple(_smoothed(line, width, wall, near) if shape.stepped else line)
-
-
-def _smoothed(line: list, width: float, wall: str, pixel: float) -> list:
-    """A line without the steps of pixels, from which it is at most a pixel away; contact stays."""
-    from shapely import LineString
-
-    opposite = width if wall == "lower" else 0.0
+    if not shape.stepped:
+        return tuple(line)
     touching = [k for k, (_, y) in enumerate(line) if y == opposite]
     cuts = [0, *touching[:1], *touching[-1:], len(line) - 1]
-    pieces = [LineString(line[start:end + 1]).simplify(pixel).coords
+    pieces = [LineString(line[start:end + 1]).simplify(near).coords
               for start, end in zip(cuts, cuts[1:]) if end > start]
-    return [*line[:1], *(point for piece in pieces for point in piece[1:])]
+    return (*line[:1], *(point for piece in pieces for point in piece[1:]))

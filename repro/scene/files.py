@@ -26,35 +26,32 @@ TOKEN = re.compile(
     |.''', re.S | re.X)
 
 
+#: The packaged scenes.
+PACKAGED = resources.files("repro.scene").joinpath("packaged")
+
+
 def packaged_scenes() -> tuple[str, ...]:
     """Names of the packaged scenes."""
-    names = [path.name for path in _folder().iterdir()]
+    names = [path.name for path in PACKAGED.iterdir()]
     return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
-
-
-def _folder():
-    return resources.files("repro.scene").joinpath("packaged")
 
 
 def read_text(file: str) -> str:
     """Read the text of a packaged scene or of a file; SceneError if it cannot be read."""
+    content = _content(file)
     try:
-        return _content(file).decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        encoding = "UTF-16" if content[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "WINDOWS-1252"
         raise SceneError(f"{file}: not UTF-8 text (at byte {error.start + 1}); "
                          "a scene is a TOML file, saved with the encoding UTF-8 of the editor, or "
-                         f"converted by: iconv -f {_encoding(error.object)} -t UTF-8") from None
-
-
-def _encoding(content: bytes) -> str:
-    """The probable encoding of a text that is not UTF-8."""
-    return "UTF-16" if content[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "WINDOWS-1252"
+                         f"converted by: iconv -f {encoding} -t UTF-8") from None
 
 
 def _content(file: str) -> bytes:
     names = packaged_scenes()
     if file in names:
-        return _folder().joinpath(f"{file}.toml").read_bytes()
+        return PACKAGED.joinpath(f"{file}.toml").read_bytes()
     if not os.path.isfile(file):
         reason = "a directory, not" if os.path.isdir(file) else "neither a file nor"
         hint = did_you_mean(nearest(file, names))
@@ -71,28 +68,27 @@ def _content(file: str) -> bytes:
 
 
 def read_tables(file: str) -> dict:
-    """Read the tables of a packaged scene or of a file; SceneError if it is not TOML."""
+    """Read the tables of a packaged scene or of a file; SceneError if it is not TOML.
+
+    Files of outlines are beside the file of the scene.
+    """
     text = read_text(file)
     deep = line_of_a_deep_key(text)
     if deep:
         raise SceneError(f"{file}: a key of more than {MOST_PARTS} parts (at line {deep}); "
                          "one of a scene has at most 3, such as substrates.donor.supply")
     try:
-        return _beside(tomllib.loads(text), Path(file).parent)
+        tables = tomllib.loads(text)
     except RecursionError:
         raise SceneError(f"{file}: not TOML: values nested too deeply; "
                          "a scene has tables of plain values") from None
     except ValueError as error:
         raise SceneError(f"{file}: not TOML: {error}{_line_of(text, str(error))}") from None
-
-
-def _beside(tables: dict, folder: Path) -> dict:
-    """Tables whose files of outlines are beside the file of the scene."""
     part = tables.get(bodies.SECTION)
     for seed in part if isinstance(part, list) else [part]:
         drawn = seed.get("outline") if isinstance(seed, dict) else None
         if isinstance(drawn, dict) and isinstance(drawn.get("file"), str):
-            drawn["file"] = str(folder / drawn["file"])
+            drawn["file"] = str(Path(file).parent / drawn["file"])
     return tables
 
 
@@ -134,7 +130,7 @@ def leave_out(tables: dict, key: str, file: str, known: tuple[str, ...]) -> None
 
     One of several aggregates becomes None, so that the others keep their numbers.
     """
-    bodies.refuse_unaddressed(tables, key_of(key), f"{file}: --unset {quote(key)}")
+    bodies.refuse_unaddressed(tables, key_of(key), f"{file}: --unset {quote(key)}", known)
     *above, last = bodies.path_of(tables, key_of(key))
     table: Any = tables
     for part in above:
@@ -162,7 +158,7 @@ def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> Non
     if len(path) > MOST_PARTS:
         raise SceneError(f"{file}: --set {quote(entry)}: a key of at most {MOST_PARTS} parts "
                          "is needed")
-    bodies.refuse_unaddressed(tables, key_of(entry), f"{file}: --set {quote(entry)}")
+    bodies.refuse_unaddressed(tables, key_of(entry), f"{file}: --set {quote(entry)}", known)
     place = Place(file)
     path = bodies.path_of(tables, key_of(entry))
     for part, following in zip(path, path[1:]):

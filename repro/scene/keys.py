@@ -34,6 +34,7 @@ from repro.scene.units import (
     FRACTION,
     FROM_0_TO_100,
     NON_NEGATIVE,
+    NOT_IN_PAPER,
     PORE_WIDTH,
     POSITIVE_FRACTION,
     UP_TO_1,
@@ -61,7 +62,6 @@ from repro.schemes import CURVED, PAPER, PRINTED, Scheme
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
            "scene_tables"]
 
-NOT_IN_PAPER = "Not in the paper"
 SEED_RADIUS = 5.0  # um, Table 1
 STEADY = "0.001 1/h"
 LAMBDA = 2000.0  # Table 1
@@ -79,11 +79,11 @@ class Pore:
                             source="Table 1 (typically 100 um; 50 um in section 4)")
     length: float = quantity("600 um", "um", about="L_pore, from end to end", source="Table 1")
     upper_wall: str = choice(
-        "no slip", "symmetry", source=NOT_IN_PAPER,
+        "no slip", "symmetry",
         about="The upper wall: like the lower one, or the middle of a pore of twice the width, "
               "with the mirror image of the aggregate beyond it")
     depth: float | None = quantity(
-        "10 um", "um", default=None, source=NOT_IN_PAPER,
+        "10 um", "um", default=None,
         about="Depth across the plane, for flow.rate and for columns of totals; results per depth "
               "do not need it")
 
@@ -107,25 +107,23 @@ class Aggregate:
         about="R_0 of the seed, a half-disc on its wall; either this or outline",
         source="Table 1")
     position: float = quantity(
-        "0 um", "um", EITHER_SIGN, source=NOT_IN_PAPER,
+        "0 um", "um", EITHER_SIGN,
         about="x of the middle of the half-disc, or what is added to x of the points of outline; 0 "
               "is the middle of the pore")
     outline: tuple[tuple[float, float], ...] | None = scene_key(
         Points(),
         about="The seed's surface instead of a half-disc, y from the lower wall: both ends on the "
         "seed's wall (y = 0 on the lower one), the upstream one first; points on the other wall "
-        "(y = pore.width) are contact with it",
-        source=NOT_IN_PAPER)
+        "(y = pore.width) are contact with it")
     smooth: bool = scene_key(
-        Flag(), about="A spline through the points of outline, or straight lines",
-        source=NOT_IN_PAPER)
+        Flag(), about="A spline through the points of outline, or straight lines")
     inert_fraction: float = number(
-        0.0, BELOW_1, source=NOT_IN_PAPER,
+        0.0, BELOW_1,
         about="Share of X_I in the biomass at t = 0, where X_A + X_I = X_m")
     wall: str = choice(
-        "lower", "upper", source=NOT_IN_PAPER, about="The wall on which the seed sits")
+        "lower", "upper", about="The wall on which the seed sits")
     name: str | None = scene_key(
-        WORD, source=NOT_IN_PAPER,
+        WORD,
         about="Name of the aggregate among several: in keys such as aggregate.upstream.radius, in "
               "columns and messages; by default its number, from 1")
 
@@ -157,7 +155,7 @@ class Flow:
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
         about="u_ave, mean over the width; either this, head or rate")
     rate: float | None = timed_quantity(
-        "0.1 uL/min", "um^3/h", NON_NEGATIVE, default=None, source=NOT_IN_PAPER,
+        "0.1 uL/min", "um^3/h", NON_NEGATIVE, default=None,
         about="Flow through the whole pore, of width and pore.depth, with the mirror image beyond "
               "a plane of symmetry; either this, head or mean_velocity")
     viscosity_ratio: float | None = number(
@@ -197,12 +195,8 @@ class Substrate:
                            about="C_supply of the water that comes in, and of all water at t = 0")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
-    diffusivity: float = quantity(
-        "2.32 cm^2/day", "um^2/h", default=MISSING, about="D in water",
-        source="(7)-(8), Table 1")
-    diffusivity_in_aggregate: float = share(
-        "1.85 cm^2/day", "um^2/h", "diffusivity", about="D in the aggregate",
-        source="2.2, Table 1", default=MISSING)
+    diffusivity: float  # a key of Acceptor and of Donor
+    diffusivity_in_aggregate: float
 
     def __post_init__(self):
         inside = self.diffusivity_in_aggregate
@@ -232,8 +226,7 @@ class Donor(Substrate):
         "0.81 cm^2/day", "um^2/h", "diffusivity", about="D_D in the aggregate",
         source="2.2 (80 % of that in water), Table 1")
     inhibition_constant: float = quantity(
-        "100 mg/L", "mg/L", about="K_i of Haldane's law, with kinetics.law = \"Haldane\"",
-        source=NOT_IN_PAPER)
+        "100 mg/L", "mg/L", about="K_i of Haldane's law, with kinetics.law = \"Haldane\"")
 
 
 @dataclass(frozen=True)
@@ -253,7 +246,7 @@ class Substrates:
         about="The electron donor, phenol; left out beside [substrates.acceptor]: it does not "
               "limit")
     boundary: str = choice(
-        "open", "closed", source=NOT_IN_PAPER,
+        "open", "closed",
         about="Without [flow] the pore's ends hold the supply, or let nothing pass")
 
     def __post_init__(self):
@@ -316,8 +309,8 @@ class Kinetics:
     def __post_init__(self):
         if self.acceptor_to_donor_ratio is None:
             implied = self.implied_ratio
-            ratio = RATIO if implied is None else implied
-            object.__setattr__(self, "acceptor_to_donor_ratio", ratio)
+            object.__setattr__(self, "acceptor_to_donor_ratio",
+                               RATIO if implied is None else implied)
 
     @property
     def implied_ratio(self) -> float | None:
@@ -332,20 +325,19 @@ class Erosion:
     """Speed (um/h) at which free surfaces recede along their normal; the law needs its keys."""
 
     law: str = choice(
-        "constant", "thickness squared", "shear", source=NOT_IN_PAPER,
+        "constant", "thickness squared", "shear",
         about="speed; thickness_coefficient z^2, with the distance z from the wall of the seed; "
               "or shear_coefficient max(tau - critical_shear, 0), with the shear tau of the water")
     speed: float | None = quantity(
-        "0.1 um/h", "um/h", default=None, source=NOT_IN_PAPER, about="Of the law \"constant\"")
+        "0.1 um/h", "um/h", default=None, about="Of the law \"constant\"")
     thickness_coefficient: float | None = quantity(
         "0.01 1/um/h", "1/um/h", default=None,
-        source=NOT_IN_PAPER,
         about="Of the law \"thickness squared\" (Wanner and Gujer 1986, Xavier et al. 2005)")
     shear_coefficient: float | None = quantity(
-        "1 um/h/Pa", "um/h/MPa", default=None, source=NOT_IN_PAPER,
+        "1 um/h/Pa", "um/h/MPa", default=None,
         about="Of the law \"shear\"")
     critical_shear: float = quantity(
-        "0 Pa", "MPa", NON_NEGATIVE, source=NOT_IN_PAPER,
+        "0 Pa", "MPa", NON_NEGATIVE,
         about="Shear up to which a surface stays, with the law \"shear\"")
 
 
@@ -396,14 +388,14 @@ class Growth:
         LIMITING, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
         about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
     until: str = choice(
-        "end", "steady", source=NOT_IN_PAPER,
+        "end", "steady",
         about="The run goes on to end, or ends early if the aggregates are steady")
     steady_tolerance: float = quantity(
-        STEADY, "1/h", source=NOT_IN_PAPER,
+        STEADY, "1/h",
         about="They are if area, thickness and length of each change by less than this part of "
               "themselves per time, in the mean over a step")
     erosion: Erosion | None = section(
-        Erosion, default=None, source=NOT_IN_PAPER,
+        Erosion, default=None,
         about="The water erodes the aggregates' free surfaces; left out: nothing is eroded")
 
     @property
@@ -438,7 +430,7 @@ class Numerics:
               "0.1 %, exact by less than 0.01 %. paper is the paper's scheme, and conserves mass; "
               "as_printed does not [E4, E8]. sketch errs by about 1 % until contact. Errors grow "
               "after contact, those of sketch to 18 % in narrow pores")
-    tolerance: float = number(0.01, UP_TO_1, source=NOT_IN_PAPER,
+    tolerance: float = number(0.01, UP_TO_1,
                               about="Largest error of a midpoint step: change of the growth rate "
                                     "times the step")
     transport: str = choice(
@@ -451,7 +443,7 @@ class Numerics:
         about="Mesh the part around the aggregate, or the whole pore")
     interface: str = choice("laplacian", "traction", source="(1) [E2]",
                             about="What of the flow is continuous across the interface")
-    solver: str = choice("superlu", "pardiso", source=NOT_IN_PAPER,
+    solver: str = choice("superlu", "pardiso",
                          about="Solver of linear systems; the second needs the package pypardiso")
     refinement: float = number(
         1.0, UP_TO_20, source="3.1 [E13]", about="Divides the element sizes")
@@ -459,7 +451,7 @@ class Numerics:
         0.25, FRACTION, source="3.1 [E13]",
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
     contact_elements: float = number(
-        0.0, FROM_0_TO_100, source=NOT_IN_PAPER,
+        0.0, FROM_0_TO_100,
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     exchanged: Scheme | None = None  # no key: ``repro.simulate(..., scheme=...)``
@@ -508,7 +500,7 @@ class Output:
         "step, with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are "
         "24 rows or more after t = 0")
     every: float = quantity(
-        "1 h", "h", default=None, source=NOT_IN_PAPER,
+        "1 h", "h", default=None,
         about="Interval of rows and fields from t = 0 on, with a last one at growth.end; times "
         "adds others")
 
@@ -590,7 +582,7 @@ class Scene:
         about="The aggregate grows as a neo-Hookean body and moves; left out: the state at t = 0 "
               "alone")
     numerics: Numerics = section(Numerics, about="How it is solved", source="Section 3")
-    output: Output = section(Output, about="What is written", source=NOT_IN_PAPER)
+    output: Output = section(Output, about="What is written")
     units: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -612,9 +604,9 @@ class Scene:
         return bodies.labels([seed.name for seed in self.aggregates])
 
     @property
-    def places(self) -> list[str]:
+    def aggregate_keys(self) -> list[str]:
         """The dotted key of each aggregate, such as "aggregate.2"; "aggregate" of the only one."""
-        return bodies.places([seed.name for seed in self.aggregates])
+        return bodies.dotted_keys([seed.name for seed in self.aggregates])
 
     @property
     def growing(self) -> GrowingSections:
@@ -665,12 +657,12 @@ class Scene:
     def stated(self, section: str, key: str) -> Stated:
         """Return the value of a key of a section, a quantity, in the unit of the scene's text.
 
-        The section of an aggregate is its dotted key, as in ``places``.
+        The section of an aggregate is its dotted key, as in ``aggregate_keys``.
         """
-        part = self.aggregates[self.places.index(section)] \
-            if section in self.places else getattr(self, section)
+        keys = self.aggregate_keys
+        part = self.aggregates[keys.index(section)] if section in keys else getattr(self, section)
         kind = entries(type(part))[key].metadata["kind"]
-        place = bodies.numbered(self.places, section)
+        place = bodies.numbered(keys, section)
         return kind.stated(getattr(part, key),
                            self.units.get(f"{place}.{key}", kind.usual_unit))
 
@@ -759,7 +751,10 @@ def load_tables(source: Source, overrides: Collection[str] = (), unset: Sequence
     if isinstance(source, Scene):
         tables = scene_tables(source)
         if "numerics.preset" in map(key_of, overrides):
-            tables["numerics"] = _beside_preset(source.numerics)
+            of_preset = Numerics(source.numerics.preset, **PRESETS[source.numerics.preset])
+            tables["numerics"] = {  # another preset sets the other keys
+                key: value for key, value in write_table(source.numerics).items()
+                if getattr(source.numerics, key) != getattr(of_preset, key)}
     else:
         tables = deepcopy(source) if isinstance(source, dict) else read_tables(file)
     tables = bodies.single(tables)
@@ -779,12 +774,19 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
     the error names one of these. scheme: another one than that of the preset. Raises SceneError,
     naming `file`, if the scene is not accepted.
     """
-    _refuse_missing(tables, file)
+    if not tables:
+        sections = ", ".join(f"[{key}]" for key in entries(Scene))
+        raise SceneError(f"{file}: an empty scene: one section or more is needed of {sections}")
     tables = bodies.single(tables)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
     text = name.encode(errors="backslashreplace").decode()  # bytes in the name of a file
-    scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=text,
+    numerics = tables.get("numerics", {})
+    preset = numerics.get("preset", "fast") if isinstance(numerics, dict) else None
+    of_preset = tables
+    if isinstance(preset, str) and preset in PRESETS:  # else read_table reports the error
+        of_preset = {**tables, "numerics": {"preset": preset, **PRESETS[preset], **numerics}}
+    scene = read_table(Scene, of_preset, Place(file, known=KEYS), name=text,
                        units=units_of(tables))
     if scheme is not None and scheme != scene.numerics.scheme:
         scene = replace(scene, numerics=replace(scene.numerics, exchanged=scheme))
@@ -794,11 +796,6 @@ def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = (),
             key = _to_name(list(requirement), tables, changed)
             value = _at(tables, key, _at(scene_tables(scene), key, MISSING))
             raise Place(file, key).refuse(value, requirement[key])
-    return _with_velocity(scene)
-
-
-def _with_velocity(scene: Scene) -> Scene:
-    """Return the scene with the mean velocity (um/h) of its flow rate."""
     if scene.flow is None or scene.flow.rate is None:
         return scene
     area = scene.pore.whole_width * scene.pore.depth
@@ -808,27 +805,19 @@ def _with_velocity(scene: Scene) -> Scene:
     return replace(scene, flow=replace(scene.flow, mean_velocity=velocity))
 
 
-def _as_given(scene: Scene) -> Scene:
-    """Return the scene without the mean velocity of its flow rate."""
-    if scene.flow is None or scene.flow.rate is None:
-        return scene
-    return replace(scene, flow=replace(scene.flow, mean_velocity=None))
-
-
 def _with_files(scene: Scene, file: str) -> Scene:
     """Read the outlines that are files. Raises SceneError, naming the scene's ``file``."""
-    seeds = []
-    for place, seed in zip(scene.places, scene.aggregates):
+    seeds = list(scene.aggregates)
+    for k, (key, seed) in enumerate(zip(scene.aggregate_keys, seeds)):
         if isinstance(seed.outline, Drawn):
             from repro.scene.drawn import points_of  # a scene without files does not load it
 
             try:
                 points = points_of(seed.outline, seed.wall, scene.pore.width)
             except Refused as error:
-                key = Place(file, f"{place}.outline")
-                raise key.refuse(asdict(seed.outline), str(error)) from None
-            seed = replace(seed, outline=points)
-        seeds.append(seed)
+                outline = Place(file, f"{key}.outline")
+                raise outline.refuse(asdict(seed.outline), str(error)) from None
+            seeds[k] = replace(seed, outline=points)
     return replace(scene, aggregates=tuple(seeds))
 
 
@@ -838,35 +827,18 @@ def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
     for key in keys:
         if any(_within(key, other) or _within(other, key) for other in changed):
             return key
-    present = [key for key in keys if _at(tables, key, MISSING) is not MISSING]
-    return [*present, *keys][0]
+    return next((key for key in keys if _at(tables, key, MISSING) is not MISSING), keys[0])
 
 
 def _within(key: str, section: str) -> bool:
     return f"{key}.".startswith(f"{section}.")
 
 
-def _refuse_missing(tables: dict, file: str) -> None:
-    """Raise SceneError if there is no section."""
-    if not tables:
-        sections = ", ".join(f"[{key}]" for key in entries(Scene))
-        raise SceneError(f"{file}: an empty scene: one section or more is needed of {sections}")
-
-
-def _with_preset(tables: dict) -> dict:
-    """Return the tables with the defaults of their preset, "fast" if they name none."""
-    numerics = tables.get("numerics", {})
-    named = numerics.get("preset", "fast") if isinstance(numerics, dict) else None
-    if not isinstance(named, str) or named not in PRESETS:
-        return tables  # read_table reports the error
-    return {**tables, "numerics": {"preset": named, **PRESETS[named], **numerics}}
-
-
-def _beside_preset(numerics: Numerics) -> dict:
-    """Return the keys of [numerics] that differ from their preset; another preset sets the rest."""
-    of_preset = Numerics(numerics.preset, **PRESETS[numerics.preset])
-    return {key: value for key, value in write_table(numerics).items()
-            if getattr(numerics, key) != getattr(of_preset, key)}
+def _as_given(scene: Scene) -> Scene:
+    """Return the scene without the mean velocity of its flow rate."""
+    if scene.flow is None or scene.flow.rate is None:
+        return scene
+    return replace(scene, flow=replace(scene.flow, mean_velocity=None))
 
 
 def scene_tables(scene: Scene) -> dict:

@@ -1,8 +1,9 @@
-"""Optional sections of a scene that a stage requires."""
+"""What is optional: sections of a scene, which a stage requires, and packages."""
 
 from __future__ import annotations
 
-from typing import TypeVar
+from importlib import import_module
+from typing import Any, TypeVar
 
 Part = TypeVar("Part")
 
@@ -19,3 +20,17 @@ def needed(part: Part | None, name: str) -> Part:
     if part is None:
         raise MissingError(f"{name} is needed here, and there is none")
     return part
+
+
+def package(module: str, install: str = "") -> Any:
+    """Import a module of an optional package.
+
+    install: the packages to install, by default that of the module. Raises ImportError, in one
+    line, if it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        names = install or module
+        raise ImportError(f"the package {names.split()[0]} is not installed; "
+                          f"pip install {names}") from None

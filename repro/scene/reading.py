@@ -83,19 +83,20 @@ def read_table(kind: type, table: object, place: Place, **extra):
     Raises SceneError if the table is not accepted.
     """
     keys = entries(kind)
-    if isinstance(table, dict):
-        _refuse_unnamed(table, place)
     if not isinstance(table, dict):
         several = place.single if as_list(table) else ""
         reason = f"{several}, see {SCOPE}: " if several else ""
         requirement = f"{reason}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
         raise place.refuse(table, requirement)
     for key in table:
+        if not isinstance(key, str):  # Python may have made the table
+            where = f"[{place.key}]: " if place.key else ""
+            raise SceneError(f"{place.file}: {where}the key {quote(key)}: a text is needed")
+    for key in table:
         if key not in keys:
             below = place.below(key)
-            requirement = former.instead_of_key(below.key)
-            raise below.refuse(table[key],
-                               requirement or _instead(key, table[key], list(keys), place))
+            raise below.refuse(table[key], former.instead_of_key(below.key)
+                               or _instead(key, table[key], [*keys], place))
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].requirement)
@@ -103,19 +104,21 @@ def read_table(kind: type, table: object, place: Place, **extra):
     return kind(**extra, **read)
 
 
-def _refuse_unnamed(table: dict, place: Place) -> None:
-    """Raise SceneError if a key of a table, which Python may have made, is not a text."""
-    for key in table:
-        if not isinstance(key, str):
-            where = f"[{place.key}]: " if place.key else ""
-            raise SceneError(f"{place.file}: {where}the key {quote(key)}: a text is needed")
-
-
 def _read_entry(entry: Field, value: object, place: Place):
-    if "key" in entry.metadata:
-        return _read_tables(entry.metadata["section"], value, place)
-    if "section" in entry.metadata:
-        return read_table(entry.metadata["section"], value, place)
+    """Read a value, a table or, where there may be several, the tables of a list, each at the place
+    of its name or number."""
+    section = entry.metadata.get("section")
+    if section:
+        tables = as_list(value) if "key" in entry.metadata else None
+        if tables is None:
+            part = read_table(section, value, place)
+            return (part,) if "key" in entry.metadata else part
+        if not tables:
+            raise place.refuse(value, f"a table [{place.key}] is needed, or one or more "
+                                      f"[[{place.key}]]")
+        names = [table.get("name") if isinstance(table, dict) else None for table in tables]
+        return tuple(read_table(section, table, place.below(label))
+                     for table, label in zip(tables, bodies.labels(names)))
     kind = entry.metadata["kind"]
     try:
         return kind.read(value)
@@ -124,19 +127,6 @@ def _read_entry(entry: Field, value: object, place: Place):
     except (ValueError, OverflowError) as error:
         hint = because(error) + did_you_mean(kind.near(value))
         raise place.refuse(value, kind.requirement + hint) from None
-
-
-def _read_tables(kind: type, value: object, place: Place) -> tuple:
-    """Read a table, or the tables of a list, each at the place of its name or number."""
-    tables = as_list(value)
-    if tables is None:
-        return (read_table(kind, value, place),)
-    if not tables:
-        requirement = f"a table [{place.key}] is needed, or one or more [[{place.key}]]"
-        raise place.refuse(value, requirement)
-    names = [table.get("name") if isinstance(table, dict) else None for table in tables]
-    return tuple(read_table(kind, table, place.below(label))
-                 for table, label in zip(tables, bodies.labels(names)))
 
 
 def write_table(part, units: Mapping[str, str] | None = None, above: str = "") -> dict:
@@ -155,25 +145,16 @@ def write_table(part, units: Mapping[str, str] | None = None, above: str = "") -
 
 def _write_entry(entry: Field, value, units: Mapping[str, str] | None, key: str):
     if isinstance(value, tuple) and "section" in entry.metadata:
-        tables = [write_table(part, units, f"{place}.")
-                  for part, place in zip(value, _numbered(key, len(value)))]
-        return tables if len(tables) > 1 else tables[0]
+        if len(value) == 1:
+            return write_table(value[0], units, f"{key}.")
+        return [write_table(part, units, f"{key}.{number}.")
+                for number, part in enumerate(value, 1)]
     if "section" in entry.metadata:
         return write_table(value, units, f"{key}.")
     kind = entry.metadata["kind"]
     if units is None or not isinstance(kind, Quantity):
         return kind.write(value)
     return kind.write(value, units.get(key, kind.usual_unit))
-
-
-def _numbered(key: str, count: int) -> list[str]:
-    """The keys of the units of tables in a list: the key itself for one table."""
-    return [key] if count == 1 else [f"{key}.{number}" for number in range(1, count + 1)]
-
-
-def toml(tables: dict, above: str = "") -> str:
-    """Format tables as a TOML file in ASCII, values before subtables."""
-    return _toml(tables, f"[{above[:-1]}]" if above else "", above)
 
 
 def toml_value(value: object) -> str:
@@ -203,7 +184,11 @@ def assignments(changes: dict) -> list[str]:
     return texts
 
 
-def _toml(tables: dict, head: str, above: str) -> str:
+def toml(tables: dict, head: str = "", above: str = "") -> str:
+    """Format tables as a TOML file in ASCII, values before subtables.
+
+    head: the line before them; above: their dotted key, with a dot at its end.
+    """
     lines = [head] if head else []
     inner = {key: value for key, value in tables.items() if isinstance(value, dict)
              or isinstance(value, list) and value and isinstance(value[0], dict)}
@@ -212,7 +197,7 @@ def _toml(tables: dict, head: str, above: str) -> str:
     for key, value in inner.items():
         name = f"{above}{key}"
         each, head = (value, f"[[{name}]]") if isinstance(value, list) else ([value], f"[{name}]")
-        parts += [_toml(table, head, f"{name}.") for table in each]
+        parts += [toml(table, head, f"{name}.") for table in each]
     return "\n\n".join(parts)
 
 
@@ -220,14 +205,11 @@ def _instead(key: str, value: object, keys: list[str], place: Place) -> str:
     table = f"[{place.key}]" if place.key else "a scene"
     message = f"there is no such key; {table} takes {', '.join(keys)}"
     is_table = isinstance(value, dict)
-    known = _sections(place.known) if is_table else place.known
-    near = nearest(key, keys) or elsewhere(key, known)
+    near = nearest(key, keys) or elsewhere(key, tuple(
+        known for known in place.known
+        if not is_table or any(other.startswith(f"{known}.") for other in place.known)))
     sentence = out_of_scope(key) or (place.single if is_table and not near else "")
     return f"{message}; {sentence}, see {SCOPE}" if sentence else message + did_you_mean(near)
-
-
-def _sections(keys: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(key for key in keys if any(other.startswith(f"{key}.") for other in keys))
 
 
 def out_of_scope(key: str) -> str:

@@ -1,7 +1,7 @@
 """Constraints between the keys of a scene."""
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from repro.scene.time_table import TimeTable
 if TYPE_CHECKING:
     from repro.scene import (
         Aggregate,
+        Donor,
         Erosion,
         Flow,
         Growth,
@@ -39,15 +40,20 @@ Rules = Iterator[tuple[bool, dict[str, str]]]
 
 def rules(scene: "Scene") -> Rules:
     """All rules: is each broken, and the requirement of each key given the others."""
-    for place, aggregate in zip(scene.places, scene.aggregates):
-        yield from _aggregate_rules(scene, place, aggregate)
+    for key, aggregate in zip(scene.aggregate_keys, scene.aggregates):
+        yield from _aggregate_rules(scene, key, aggregate)
     yield from _pair_rules(scene)
     if scene.flow:
         yield from _flow_rules(scene, scene.flow)
-        yield from _biomass_rules(scene, scene.flow)
     if scene.substrates:
-        yield from _boundary_rules(scene)
-    yield from _growth_rules(scene)
+        yield from _substrate_rules(scene, scene.substrates)
+    for name in ("kinetics", "growth") if not (scene.substrates and scene.aggregates) else ():
+        yield getattr(scene, name) is not None, {
+            name: "[aggregate] and [substrates] are needed with it"}
+    if scene.kinetics:
+        yield from _kinetics_rules(scene.kinetics, scene.substrates.donor)
+    if scene.growth:
+        yield from _growth_rules(scene, scene.growth)
     yield from _numerics_rules(scene)
     yield from _output_rules(scene)
 
@@ -61,29 +67,26 @@ def _not_both(other: str, value: str = "") -> str:
 
 def _aggregate_rules(scene: "Scene", place: str, aggregate: "Aggregate") -> Rules:
     """Rules of one aggregate; place: its dotted key."""
-    yield from _name_rules(scene, place, aggregate)
-    symmetry = 'pore.upper_wall = "symmetry": no aggregate sits on a plane of symmetry'
-    yield aggregate.wall == "upper" and scene.pore.upper_wall == "symmetry", {
-        f"{place}.wall": f'"lower" is needed with {symmetry}',
-        "pore.upper_wall": f'"no slip" is needed with {place}.wall = "upper"'}
-    if aggregate.outline is None:
-        yield from _seed_rules(place, aggregate, scene.pore)
-        yield from _position_rules(place, aggregate, scene.pore)
-    else:
-        yield from _outline_rules(place, aggregate)
-        yield from _shape_rules(place, aggregate, scene.pore)
-    inert = aggregate.inert_fraction != 0 and scene.substrates is None
-    requirement = "0 is needed without [substrates]: inert biomass differs in uptake alone"
-    yield inert, {f"{place}.inert_fraction": requirement}
-
-
-def _name_rules(scene: "Scene", place: str, aggregate: "Aggregate") -> Rules:
     key = f"{place}.name"
     taken = {field.name for field in fields(aggregate)}
     yield aggregate.name in taken, {key: "another name is needed: it is a key of [aggregate]"}
     named = [seed.name for seed in scene.aggregates if seed.name]
     yield named.count(aggregate.name) > 1 and place != f"aggregate.{aggregate.name}", {
         key: "another name is needed: each aggregate has its own"}
+    symmetry = 'pore.upper_wall = "symmetry": no aggregate sits on a plane of symmetry'
+    yield aggregate.wall == "upper" and scene.pore.upper_wall == "symmetry", {
+        f"{place}.wall": f'"lower" is needed with {symmetry}',
+        "pore.upper_wall": f'"no slip" is needed with {place}.wall = "upper"'}
+    radius = "" if aggregate.radius is None else f"{aggregate.radius:g} um"
+    if aggregate.outline is None:
+        yield from _seed_rules(place, aggregate, scene.pore)
+    else:
+        yield bool(radius), {f"{place}.radius": _not_both(f"{place}.outline"),
+                             f"{place}.outline": _not_both(f"{place}.radius", radius)}
+        yield from _shape_rules(f"{place}.outline", aggregate, scene.pore)
+    inert = aggregate.inert_fraction != 0 and scene.substrates is None
+    requirement = "0 is needed without [substrates]: inert biomass differs in uptake alone"
+    yield inert, {f"{place}.inert_fraction": requirement}
 
 
 def _pair_rules(scene: "Scene") -> Rules:
@@ -92,11 +95,11 @@ def _pair_rules(scene: "Scene") -> Rules:
     least = growth.minimum_film if growth else FINEST * scene.pore.width
     named = "growth.minimum_film" if growth else "a thousandth of pore.width"
     bodies = [(place, *_extent(aggregate, scene.pore.width))
-              for place, aggregate in zip(scene.places, scene.aggregates)]
+              for place, aggregate in zip(scene.aggregate_keys, scene.aggregates)]
     for (one, near, reach), (other, far, extent) in combinations(bodies, 2):
         gap = _distance(near, far) - reach - extent
-        apart = f"are {gap:.3g} um apart" if gap > 0 else "overlap or touch"
-        requirement = f"{one} and {other} {apart}; {named} ({least:g} um) or more is needed"
+        distance = f"are {gap:.3g} um apart" if gap > 0 else "overlap or touch"
+        requirement = f"{one} and {other} {distance}; {named} ({least:g} um) or more is needed"
         yield gap < least, {f"{place}.{key}": requirement for place in (other, one)
                             for key in ("position", "radius", "outline")}
 
@@ -104,10 +107,11 @@ def _pair_rules(scene: "Scene") -> Rules:
 def _extent(aggregate: "Aggregate", width: float) -> tuple[Outlined, float]:
     """An aggregate as the points within a distance (um) of others: the middle of a half-disc, or
     the corners of an outline."""
+    x = aggregate.position
     if aggregate.outline is None:
         level = 0.0 if aggregate.wall == "lower" else width
-        return ((aggregate.position, level),), aggregate.radius
-    return _shifted(aggregate), 0.0
+        return ((x, level),), aggregate.radius
+    return tuple((x + each, y) for each, y in aggregate.outline), 0.0
 
 
 def _distance(one: Outlined, other: Outlined) -> float:
@@ -120,135 +124,73 @@ def _distance(one: Outlined, other: Outlined) -> float:
     return shapes[0].distance(shapes[1])
 
 
-def _shifted(aggregate: "Aggregate") -> Outlined:
-    """The points of an outline in the pore (um)."""
-    return tuple((x + aggregate.position, y) for x, y in aggregate.outline)
-
-
 def _seed_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
     radius = aggregate.radius
-    least = f"{place}.radius ({radius:g} um) is needed"
+    stated = f"{place}.radius ({radius:g} um)"
     requirement = (f"less than pore.width ({pore.width:g} um) and half of pore.length "
                    f"({pore.length:g} um) is needed")
-    yield radius >= pore.width, {
-        f"{place}.radius": requirement,
-        "pore.width": f"more than {least}",
-    }
-    yield 2 * radius >= pore.length, {
-        f"{place}.radius": requirement,
-        "pore.length": f"more than twice {least}",
-    }
+    yield radius >= pore.width, {f"{place}.radius": requirement,
+                                 "pore.width": f"more than {stated} is needed"}
+    yield 2 * radius >= pore.length, {f"{place}.radius": requirement,
+                                      "pore.length": f"more than twice {stated} is needed"}
     yield radius < pore.width * FINEST, {
         f"{place}.radius": f"a thousandth of pore.width ({pore.width:g} um) or more is needed",
-        "pore.width": f"at most a thousand times {least}",
-    }
-
-
-def _position_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
-    radius = f"{place}.radius ({aggregate.radius:g} um)"
+        "pore.width": f"at most a thousand times {stated} is needed"}
     position = f"{place}.position ({aggregate.position:g} um)"
     half = f"half of pore.length ({pore.length:g} um)"
-    yield abs(aggregate.position) + aggregate.radius >= pore.length / 2, {
-        f"{place}.position": f"less than {half} less {radius}, upstream or downstream, is needed",
+    yield abs(aggregate.position) + radius >= pore.length / 2, {
+        f"{place}.position": f"less than {half} less {stated}, upstream or downstream, is needed",
         f"{place}.radius": f"less than {half} less the distance of {position} is needed",
-        "pore.length": f"more than twice {radius} and the distance of {position} is needed",
-    }
-    requirement = f"true is accepted only with {place}.outline"
-    yield aggregate.smooth, {f"{place}.smooth": requirement}
+        "pore.length": f"more than twice {stated} and the distance of {position} is needed"}
+    yield aggregate.smooth, {f"{place}.smooth": f"true is accepted only with {place}.outline"}
 
 
-def _outline_rules(place: str, aggregate: "Aggregate") -> Rules:
-    radius = "" if aggregate.radius is None else f"{aggregate.radius:g} um"
-    yield aggregate.radius is not None, {
-        f"{place}.radius": _not_both(f"{place}.outline"),
-        f"{place}.outline": _not_both(f"{place}.radius", radius),
-    }
+#: An outline's wall in messages: y on it, the opposite wall, y on that, and accepted values of y.
+_SIDES = {"lower": ("y = 0 um", "upper wall", "y = pore.width", "0 < y <= pore.width ({})"),
+          "upper": ("y = pore.width", "lower wall", "y = 0", "0 <= y < pore.width ({})")}
 
 
-@dataclass(frozen=True)
-class _Side:
-    """An outline's wall in messages: y on it and on the opposite wall, and accepted values of y."""
-
-    own: str
-    opposite: str
-    accepted: str
-
-
-_SIDES = {"lower": _Side("y = 0 um", "upper wall (y = pore.width)", "0 < y <= pore.width ({})"),
-          "upper": _Side("y = pore.width", "lower wall (y = 0)", "0 <= y < pore.width ({})")}
-
-
-def _shape_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
+def _shape_rules(key: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
     """Rules of an outline. ``points`` have their y from its own wall."""
-    key = f"{place}.outline"
-    side = _SIDES[aggregate.wall]
-    upper = aggregate.wall == "upper"
-    drawn = _shifted(aggregate)
-    points = tuple((x, pore.width - y if upper else y) for x, y in drawn)
-    first = points[0]
-    last = points[-1]
-    requirement = f"{side.own} at the first and the last point is needed"
-    yield first[1] != 0 or last[1] != 0, {key: requirement}
+    own, wall, opposite, accepted = _SIDES[aggregate.wall]
+    width, half = pore.width, pore.length / 2
+    drawn, _ = _extent(aggregate, width)
+    points = tuple((x, y if aggregate.wall == "lower" else width - y) for x, y in drawn)
+    first, *_, last = points
+    yield first[1] != 0 or last[1] != 0, {key: f"{own} at the first and the last point is needed"}
     requirement = "the upstream end first (x of the first point less than of the last) is needed"
     yield first[0] >= last[0], {key: requirement}
-    for number, point in enumerate(points, 1):
-        end = number in (1, len(points))
-        x, y = drawn[number - 1]
-        yield from _point_rules(key, side, f"point {number} ({x:g} um, {y:g} um)", point, end, pore)
-    yield from _spacing_rules(key, side, points, pore.width)
-    requirement = "a line that neither crosses nor touches itself is needed"
-    yield _crosses(points, pore.width), {key: requirement}
-    for one, other in nearest_edges(points, pore.width):
-        yield True, {key: f"{_least(pore.width)} is needed between the lines after "
-                          f"points {one} and {other}"}
-
-
-def _point_rules(key: str, side: _Side, point_name: str, point: tuple[float, float], end: bool,
-                 pore: "Pore") -> Rules:
-    x, y = point
-    yield abs(x) >= pore.length / 2, {
-        key: f"|x| < half of pore.length ({pore.length:g} um) at {point_name} is needed",
-        "pore.length": f"more than twice |x| of {point_name} of {key} is needed",
-    }
-    requirement = f"{side.accepted.format(f'{pore.width:g} um')} at {point_name} is needed"
-    yield y <= 0 and not end, {key: requirement}
-    yield y > pore.width, {
-        key: requirement,
-        "pore.width": f"y of {point_name} of {key}, or more, is needed",
-    }
-    near = min(y, pore.width - y)
-    contact = side.opposite.partition("(")[2][:-1]
-    requirement = (f"pore.width ({pore.width!r} um) over 10000, or more, is needed between "
-                   f"{point_name} and a wall that it does not touch; {contact} is contact")
-    yield 0 < near < pore.width * NEAREST, {key: requirement}
-    requirement = (f"pore.width over 10000, or more, is needed between {point_name} and the pore's "
-                   "end")
-    yield pore.length / 2 - abs(x) < pore.width * NEAREST, {key: requirement}
-
-
-def _least(width: float) -> str:
-    """The least accepted length in an outline."""
-    return f"a thousandth of pore.width ({width:g} um) or more"
-
-
-def _spacing_rules(key: str, side: _Side, points: Outlined, width: float) -> Rules:
+    for number, ((x, y), stated) in enumerate(zip(points, drawn), 1):
+        name = f"point {number} ({stated[0]:g} um, {stated[1]:g} um)"
+        yield abs(x) >= half, {
+            key: f"|x| < half of pore.length ({pore.length:g} um) at {name} is needed",
+            "pore.length": f"more than twice |x| of {name} of {key} is needed"}
+        requirement = f"{accepted.format(f'{width:g} um')} at {name} is needed"
+        yield y <= 0 and 1 < number < len(points), {key: requirement}
+        yield y > width, {key: requirement,
+                          "pore.width": f"y of {name} of {key}, or more, is needed"}
+        yield 0 < min(y, width - y) < width * NEAREST, {
+            key: f"pore.width ({width!r} um) over 10000, or more, is needed between {name} and a "
+                 f"wall that it does not touch; {opposite} is contact"}
+        yield half - abs(x) < width * NEAREST, {
+            key: f"pore.width over 10000, or more, is needed between {name} and the pore's end"}
+    least = f"a thousandth of pore.width ({width:g} um) or more is needed"
     for number, (start, end) in enumerate(zip(points, points[1:]), 1):
-        near = math.dist(start, end) < width * FINEST
-        requirement = f"{_least(width)} is needed from point {number} to the next"
-        yield near, {key: requirement}
-    requirement = f"{_least(width)} is needed between the first and the last point"
-    yield points[-1][0] - points[0][0] < width * FINEST, {key: requirement}
+        yield math.dist(start, end) < width * FINEST, {
+            key: f"{least} from point {number} to the next"}
+    yield last[0] - first[0] < width * FINEST, {
+        key: f"{least} between the first and the last point"}
     above = [number for number, (_, y) in enumerate(points) if y == width]
-    run = above == list(range(above[0], above[0] + len(above))) if above else True
-    requirement = f"two points or more in a row, or none, on the {side.opposite} are needed"
-    yield len(above) == 1 or not run, {key: requirement}
-
-
-def _crosses(points: Outlined, width: float) -> bool:
-    """Does the outline cross or touch itself?"""
+    interrupted = bool(above) and above[-1] - above[0] != len(above) - 1
+    yield len(above) == 1 or interrupted, {
+        key: f"two points or more in a row, or none, on the {wall} ({opposite}) are needed"}
     from shapely import LineString
 
-    return not LineString([(x / width, y / width) for x, y in points]).is_simple
+    line = LineString([(x / width, y / width) for x, y in points])
+    yield not line.is_simple, {
+        key: "a line that neither crosses nor touches itself is needed"}
+    for one, other in nearest_edges(points, width):
+        yield True, {key: f"{least} between the lines after points {one} and {other}"}
 
 
 def nearest_edges(points: Outlined, width: float) -> list[tuple[int, int]]:
@@ -269,11 +211,11 @@ def nearest_edges(points: Outlined, width: float) -> list[tuple[int, int]]:
 
 def _flow_rules(scene: "Scene", drive: "Flow") -> Rules:
     example = 'such as head = "1e-3 cm" or mean_velocity = "2.9 m/day"'
-    requirement = f"it, flow.mean_velocity or flow.rate is needed, {example}"
     drives = {"flow.head": _in_words(drive.head, "um"),
               "flow.mean_velocity": _in_words(drive.mean_velocity, "m/day", 24e-6),
               "flow.rate": _in_words(drive.rate, "uL/min", 1e-9 / 60)}
-    yield not any(drives.values()), {"flow.head": requirement}
+    yield not any(drives.values()), {
+        "flow.head": f"it, flow.mean_velocity or flow.rate is needed, {example}"}
     for one, other in combinations(drives, 2):
         yield bool(drives[one] and drives[other]), {
             other: _not_both(one, drives[one]), one: _not_both(other, drives[other])}
@@ -281,34 +223,27 @@ def _flow_rules(scene: "Scene", drive: "Flow") -> Rules:
         "flow.rate": "pore.depth is needed with it",
         "pore.depth": "it is needed with flow.rate"}
     still = "flow.mean_velocity" if drive.rate is None else "flow.rate"
-    yield scene.stagnant and _steady(scene), {
+    yield scene.stagnant and scene.numerics.transport == "quasi_steady", {
         still: f"greater than zero is needed{_UNSTEADY}",
-        "numerics.transport": f'"gear" is needed with {still} = 0: {_NO_STATE}',
-    }
-
-
-def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
-    """Rules of the aggregate's resistance to flow."""
-    drag = drive.permeability is not None
+        "numerics.transport": f'"gear" is needed with {still} = 0: {_NO_STATE}'}
+    if drive.permeability is None:
+        return
     permeable = f"flow.permeability = {drive.permeability} um^2"
-    yield drag and drive.viscosity_ratio is not None, {
+    yield drive.viscosity_ratio is not None, {
         "flow.permeability": _not_both("flow.viscosity_ratio", f"{drive.viscosity_ratio}"),
-        "flow.viscosity_ratio": _not_both("flow.permeability", f"{drive.permeability} um^2"),
-    }
+        "flow.viscosity_ratio": _not_both("flow.permeability", f"{drive.permeability} um^2")}
     least = TIGHTEST * scene.pore.width**2
-    yield drag and drive.permeability < 0.999 * least, {
+    yield drive.permeability < 0.999 * least, {
         "flow.permeability": f'"{1e-12 * least:.4g} m^2" or more is needed in a pore '
                              f"{scene.pore.width:g} um wide: below it round-off hides the flow",
-        "pore.width": f"{math.sqrt((drive.permeability or 0.0) / TIGHTEST):.4g} um or less is "
-                      f"needed with {permeable}",
-    }
-    yield drag and not scene.aggregates, {
+        "pore.width": f"{math.sqrt(drive.permeability / TIGHTEST):.4g} um or less is needed with "
+                      f"{permeable}"}
+    yield not scene.aggregates, {
         "flow.permeability": "[aggregate] is needed with it: it is that of the biomass"}
     requirement = '"fast", "accurate", "exact" or "sketch" is needed with'
-    yield drag and scene.numerics.scheme.order == 1, {
+    yield scene.numerics.scheme.order == 1, {
         "flow.permeability": f"numerics.preset = {requirement} it: it needs quadratic elements",
-        "numerics.preset": f"{requirement} {permeable}, which needs quadratic elements",
-    }
+        "numerics.preset": f"{requirement} {permeable}, which needs quadratic elements"}
 
 
 def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
@@ -317,47 +252,20 @@ def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
     return "a table" if isinstance(value, TimeTable) else f"{factor * value:g} {unit}"
 
 
-def _boundary_rules(scene: "Scene") -> Rules:
-    for name, part in scene.substrates.modelled.items():
+def _substrate_rules(scene: "Scene", substrates: "Substrates") -> Rules:
+    for name, part in substrates.modelled.items():
         key = f"substrates.{name}.diffusivity_in_aggregate"
         yield part.diffusivity_in_aggregate <= 0, {key: "greater than zero is needed"}
-    closed = scene.substrates.boundary == "closed"
+    closed = substrates.boundary == "closed"
     yield closed and scene.flow is not None, {
         "substrates.boundary": '"open" is needed with [flow]',
-        "flow": 'substrates.boundary = "open" is needed with it',
-    }
-    yield closed and _steady(scene), {
+        "flow": 'substrates.boundary = "open" is needed with it'}
+    yield closed and scene.numerics.transport == "quasi_steady", {
         "substrates.boundary": f'"open" is needed{_UNSTEADY}',
-        "numerics.transport": f'"gear" is needed with substrates.boundary = "closed": {_NO_STATE}',
-    }
+        "numerics.transport": f'"gear" is needed with substrates.boundary = "closed": {_NO_STATE}'}
 
 
-def _growth_rules(scene: "Scene") -> Rules:
-    alone = not (scene.substrates and scene.aggregates)
-    requirement = "[aggregate] and [substrates] are needed with it"
-    yield alone and scene.kinetics is not None, {"kinetics": requirement}
-    yield alone and scene.growth is not None, {"growth": requirement}
-    if scene.kinetics:
-        yield from _demand_rules(scene.kinetics)
-        yield from _law_rules(scene.kinetics.law, scene.substrates)
-    if scene.growth:
-        yield from _step_rules(scene.growth.end, scene.growth.time_step)
-        yield from _strength_rules(scene.growth)
-        yield from _detachment_rules(scene.growth)
-        yield from _energy_rules(scene.growth)
-        if scene.growth.erosion:
-            yield from _erosion_rules(scene, scene.growth, scene.growth.erosion)
-        yield from _mirrored_rules(scene.growth, scene.pore.upper_wall)
-    if scene.growth and scene.growth.fluid_forces == "included":
-        yield from _force_rules(scene)
-    film = scene.growth.minimum_film if scene.growth else 0.0
-    yield film >= scene.pore.width, {
-        "growth.minimum_film": f"less than pore.width ({scene.pore.width:g} um) is needed",
-        "pore.width": f"more than growth.minimum_film ({film:g} um) is needed",
-    }
-
-
-def _demand_rules(law: "Kinetics") -> Rules:
+def _kinetics_rules(law: "Kinetics", donor: "Donor | None") -> Rules:
     implied = law.implied_ratio
     demand = f"kinetics.donor_oxygen_demand ({law.donor_oxygen_demand})"
     biomass = law.yield_coefficient * law.decay_oxygen_demand
@@ -366,46 +274,55 @@ def _demand_rules(law: "Kinetics") -> Rules:
         "kinetics.donor_oxygen_demand": f"more than Y d_c ({biomass:g}) is needed: F = COD - Y d_c "
                                         "is positive",
         "kinetics.yield_coefficient": less,
-        "kinetics.decay_oxygen_demand": less,
-    }
-
-
-def _law_rules(law: str, substrates: "Substrates") -> Rules:
-    donor = substrates.donor
-    yield law == "Haldane" and donor is None, {
+        "kinetics.decay_oxygen_demand": less}
+    haldane = law.law == "Haldane"
+    yield haldane and donor is None, {
         "kinetics.law": '[substrates.donor] is needed with "Haldane": the donor inhibits',
-        "substrates.acceptor": '[substrates.donor] is needed with kinetics.law = "Haldane"',
-    }
+        "substrates.acceptor": '[substrates.donor] is needed with kinetics.law = "Haldane"'}
     changed = donor is not None and donor.inhibition_constant != INHIBITION
-    yield law != "Haldane" and changed, {
-        "substrates.donor.inhibition_constant": 'kinetics.law = "Haldane" is needed with it',
-        "kinetics.law": '"Haldane" is needed with substrates.donor.inhibition_constant',
-    }
+    yield changed and not haldane, _only_with(
+        "substrates.donor.inhibition_constant", "kinetics.law", "Haldane")
 
 
-def _step_rules(end: float, step: float) -> Rules:
+def _only_with(key: str, other: str, word: str) -> dict[str, str]:
+    """Requirements of a key that is accepted with one word of another key."""
+    return {key: f'{other} = "{word}" is needed with it',
+            other: f'"{word}" is needed with {key}'}
+
+
+def _growth_rules(scene: "Scene", growth: "Growth") -> Rules:
+    end, step = growth.end, growth.time_step
     yield step < SHORTEST_STEP, {"growth.time_step": f"{SHORTEST_STEP:g} h or more is needed"}
     yield end > MOST_STEPS * step, {
         "growth.time_step": f"growth.end ({end:g} h) over {MOST_STEPS} or more is needed",
-        "growth.end": f"at most {MOST_STEPS} times growth.time_step ({step:g} h) is needed",
-    }
-
-
-def _strength_rules(growth: "Growth") -> Rules:
+        "growth.end": f"at most {MOST_STEPS} times growth.time_step ({step:g} h) is needed"}
+    stress_free = growth.new_biomass == "stress_free"
     for key in ("bonding_strength", "tensile_strength"):
         strength = getattr(growth, key)
-        yield strength is not None and growth.new_biomass == "stress_free", {
+        yield strength is not None and stress_free, {
             f"growth.{key}": 'growth.new_biomass = "stressed" is needed with it, since the stress '
                              "counts from t = 0",
-            "growth.new_biomass": f'"stressed" is needed with growth.{key} = {strength} MPa',
-        }
-
-
-def _detachment_rules(growth: "Growth") -> Rules:
+            "growth.new_biomass": f'"stressed" is needed with growth.{key} = {strength} MPa'}
     yield growth.continues and growth.bonding_strength is None and growth.erosion is None, {
         "growth.after_detachment": "growth.bonding_strength or [growth.erosion] is needed with "
                                    "\"continue\"",
         "growth.bonding_strength": 'needed with growth.after_detachment = "continue"'}
+    yield growth.energy != "Gent" and growth.limiting_invariant != LIMITING, _only_with(
+        "growth.limiting_invariant", "growth.energy", "Gent")
+    if growth.erosion:
+        yield from _erosion_rules(scene, growth, growth.erosion)
+    yield from _mirrored_rules(growth, scene.pore.upper_wall)
+    included = growth.fluid_forces == "included"
+    yield included and scene.flow is None, {
+        "growth.fluid_forces": '"neglected" is needed without [flow]'}
+    yield included and stress_free, {
+        "growth.fluid_forces": '"neglected" is needed with growth.new_biomass = "stress_free", '
+                               "because the aggregate would yield at every update",
+        "growth.new_biomass": '"stressed" is needed with growth.fluid_forces = "included"'}
+    film = growth.minimum_film
+    yield film >= scene.pore.width, {
+        "growth.minimum_film": f"less than pore.width ({scene.pore.width:g} um) is needed",
+        "pore.width": f"more than growth.minimum_film ({film:g} um) is needed"}
 
 
 #: The key that each law of erosion needs.
@@ -419,12 +336,10 @@ def _erosion_rules(scene: "Scene", growth: "Growth", erosion: "Erosion") -> Rule
         value = getattr(erosion, key)
         yield law == erosion.law and value is None, {
             place: f'needed with growth.erosion.law = "{law}"'}
-        yield law != erosion.law and value is not None, {
-            place: f'growth.erosion.law = "{law}" is needed with it',
-            "growth.erosion.law": f'"{law}" is needed with {place}'}
-    yield erosion.law != "shear" and erosion.critical_shear > 0, {
-        "growth.erosion.critical_shear": 'growth.erosion.law = "shear" is needed with it',
-        "growth.erosion.law": '"shear" is needed with growth.erosion.critical_shear'}
+        yield law != erosion.law and value is not None, _only_with(
+            place, "growth.erosion.law", law)
+    yield erosion.law != "shear" and erosion.critical_shear > 0, _only_with(
+        "growth.erosion.critical_shear", "growth.erosion.law", "shear")
     yield erosion.law == "shear" and scene.flow is None, {
         "growth.erosion.law": '[flow] is needed with "shear"'}
     yield growth.new_biomass == "stressed", {
@@ -438,13 +353,6 @@ def _erosion_rules(scene: "Scene", growth: "Growth", erosion: "Erosion") -> Rule
         "numerics.preset": '"fast", "accurate" or "exact" is needed with [growth.erosion]'}
 
 
-def _energy_rules(growth: "Growth") -> Rules:
-    yield growth.energy != "Gent" and growth.limiting_invariant != LIMITING, {
-        "growth.limiting_invariant": 'growth.energy = "Gent" is needed with it',
-        "growth.energy": '"Gent" is needed with growth.limiting_invariant',
-    }
-
-
 def _mirrored_rules(growth: "Growth", upper_wall: str) -> Rules:
     """Beside a plane of symmetry, forces of walls and water are not verified, so not accepted."""
     unverified = {"fluid_forces": growth.fluid_forces == "included",
@@ -456,16 +364,6 @@ def _mirrored_rules(growth: "Growth", upper_wall: str) -> Rules:
             f"growth.{key}": 'pore.upper_wall = "no slip" is needed with it',
             "pore.upper_wall": f'"no slip" is needed with growth.{key}: forces on an aggregate '
                                "beside a plane of symmetry are not verified"}
-
-
-def _force_rules(scene: "Scene") -> Rules:
-    yield scene.flow is None, {"growth.fluid_forces": '"neglected" is needed without [flow]'}
-    requirement = ('"neglected" is needed with growth.new_biomass = "stress_free", because the '
-                   "aggregate would yield at every update")
-    yield scene.growth.new_biomass == "stress_free", {
-        "growth.fluid_forces": requirement,
-        "growth.new_biomass": '"stressed" is needed with growth.fluid_forces = "included"',
-    }
 
 
 def _numerics_rules(scene: "Scene") -> Rules:
@@ -491,7 +389,3 @@ def _output_rules(scene: "Scene") -> Rules:
     shortest = max(end / MOST_ROWS, SHORTEST_STEP)
     requirement = f"{shortest:.3g} h or more is needed: at most {MOST_ROWS} rows are accepted"
     yield (scene.output.every or math.inf) < shortest, {"output.every": requirement}
-
-
-def _steady(scene: "Scene") -> bool:
-    return scene.numerics.transport == "quasi_steady"

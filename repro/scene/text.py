@@ -54,14 +54,19 @@ def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] 
 
 def titles() -> dict[str, str]:
     """The title of each packaged scene: its first line."""
-    first = {name: read_text(name).partition("\n")[0] for name in packaged_scenes()}
-    return {name: line.removeprefix("# ") for name, line in first.items()}
+    return {name: read_text(name).partition("\n")[0].removeprefix("# ")
+            for name in packaged_scenes()}
 
 
 def only(part: object) -> object:
     """A section of a scene; the only one, or None, of a section that a scene may have more than
     once."""
     return (part[0] if part else None) if isinstance(part, tuple) else part
+
+
+def _about(field: Field) -> str:
+    source = field.metadata["source"]
+    return f"{field.metadata['about']}. {source if source == NOT_IN_PAPER else f'Paper: {source}'}."
 
 
 def _table(path: str, entry: Field, written: dict, part: object,
@@ -85,11 +90,6 @@ def _table(path: str, entry: Field, written: dict, part: object,
             yield f"{'' if key in written else '#'}{key} = {toml_value(value)}"
     for key, field in inner.items():
         yield from _table(f"{path}.{key}", field, written.get(key, {}), getattr(part, key, None))
-
-
-def _about(field: Field) -> str:
-    source = field.metadata["source"]
-    return f"{field.metadata['about']}. {source if source == NOT_IN_PAPER else f'Paper: {source}'}."
 
 
 def stated(kind: type, key: str, field: Field) -> str:

@@ -16,6 +16,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
@@ -58,6 +59,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
 _MOLES = re.compile(r"(?<![A-Za-z])(?:[num\u00b5\u03bc]|milli|micro|nano)?"
                     r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
 _ODD = re.compile(r"[^A-Za-z0-9\u00b5\u03bc .+*/^-]")
+NOT_IN_PAPER = "Not in the paper"
 NO_MOLES = "moles need a molar mass, which is not known here: give milligrams"
 NO_PARTS = "give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"
 
@@ -89,6 +91,16 @@ class Stated(NamedTuple):
     text: str
     number: float
     unit: str
+
+
+class Plain:
+    """A kind of values that TOML has itself, and for which nothing near a refused one is known."""
+
+    def write(self, value):
+        return value
+
+    def near(self, value: object) -> str:
+        return ""
 
 
 @dataclass(frozen=True)
@@ -169,10 +181,13 @@ class Timed(Quantity):
         return f'{{ table = {self._table}, between = "linear" }}'
 
     def read(self, value: object) -> float | TimeTable:  # type: ignore[override]  # or a table
-        between, entries = _table_parts(value)
-        if between not in ("steps", "linear"):
-            raise Refused('a table and what is between its times, "steps" or "linear", are needed, '
-                          f"such as {self._linear}")
+        between, entries = "steps", as_list(value)
+        if isinstance(value, dict) and "table" in value:
+            entries, between = as_list(value["table"]), value.get("between")
+            if (value.keys() != {"table", "between"} or entries is None
+                    or between not in ("steps", "linear")):
+                raise Refused('a table and what is between its times, "steps" or "linear", are '
+                              f"needed, such as {self._linear}")
         if entries is None:
             return super().read(value)
         if not 1 <= len(entries) <= MOST_POINTS:
@@ -189,15 +204,15 @@ class Timed(Quantity):
     def _entry(self, number: int, entry: object) -> tuple[float, float]:
         """Time and value of an entry of a table."""
         pair = as_list(entry)
+        example = f'["5 h", "{self.example}"]'
         if pair is None or len(pair) != 2:
             raise Refused(f"entry {number} of a table must be a time and a value, such as "
-                          f'["5 h", "{self.example}"]')
+                          f"{example}")
         try:
             return self.clock.read(pair[0]), super().read(pair[1])
         except (ValueError, OverflowError) as error:
             raise Refused(f"entry {number} of a table must be a time of zero or more and "
-                          f'{super().accepted}, such as ["5 h", "{self.example}"]'
-                          f"{because(error)}") from None
+                          f"{super().accepted}, such as {example}{because(error)}") from None
 
     def write(self, value, unit=""):
         if not isinstance(value, TimeTable):
@@ -232,7 +247,7 @@ class Share(Quantity):
 
 
 @dataclass(frozen=True)
-class Number:
+class Number(Plain):
     """A plain number, without a unit."""
 
     example: float
@@ -265,12 +280,9 @@ class Number:
             raise ValueError(NO_MOLES if has_moles else _fault(value))
         return _within(self.accepts, float(value))
 
-    def write(self, value: float) -> float:
-        return float(value)
-
 
 @dataclass(frozen=True)
-class Choice:
+class Choice(Plain):
     """One of a few words."""
 
     words: tuple[str, ...]
@@ -296,12 +308,9 @@ class Choice:
             raise ValueError(_wrong_type(value))
         return str(value)
 
-    def write(self, value: str) -> str:
-        return value
-
 
 @dataclass(frozen=True)
-class Word:
+class Word(Plain):
     """A name that is a key of TOML without quotes and no number."""
 
     default: ClassVar[dict] = {"default": None}
@@ -318,12 +327,6 @@ class Word:
         if not self.accepts(value):
             raise ValueError(_wrong_type(value))
         return str(value)
-
-    def write(self, value: str) -> str:
-        return value
-
-    def near(self, value: object) -> str:
-        return ""
 
 
 WORD = Word()
@@ -407,7 +410,7 @@ class Points:
 
 
 @dataclass(frozen=True)
-class Flag:
+class Flag(Plain):
     """Yes or no."""
 
     default: ClassVar[dict] = {"default": False}
@@ -419,9 +422,6 @@ class Flag:
             raise ValueError(_wrong_type(value))
         return value
 
-    def write(self, value: bool) -> bool:
-        return value
-
     def near(self, value: object) -> str:
         """Suggest the word true or false without its quotes."""
         word = value.casefold() if isinstance(value, str) else ""
@@ -431,7 +431,7 @@ class Flag:
 Kind = Quantity | Number | Choice | Word | Times | Points | Flag
 
 
-def scene_key(kind: Kind, *, about: str, source: str, stated: str = "", **default):
+def scene_key(kind: Kind, *, about: str, source: str = NOT_IN_PAPER, stated: str = "", **default):
     """Declare a key of a scene: a field of a dataclass whose metadata describe the key.
 
     default: of the field, if it is not that of the kind; stated: describes a default that depends
@@ -485,7 +485,7 @@ def choice(*words: str, **described):
     return scene_key(Choice(words), **described)
 
 
-def section(kind: type, *, about: str, source: str, **default):
+def section(kind: type, *, about: str, source: str = NOT_IN_PAPER, **default):
     """Declare a table, whose keys are those of the dataclass `kind`."""
     default = default or {"default_factory": kind}
     return field(metadata={"section": kind, "about": about, "source": source}, **default)
@@ -582,18 +582,6 @@ def _wrong_type(value: object) -> str:
 def because(error: Exception) -> str:
     """Return the reason of a refusal after a semicolon; empty without a reason."""
     return f"; {error}" if str(error) else ""
-
-
-def _table_parts(value: object) -> tuple[object, list | None]:
-    """Return what is between the times of a table over time, and its entries.
-
-    The word is None if a table has other parts; the entries are None if the value is no table.
-    """
-    if not isinstance(value, dict) or "table" not in value:
-        return "steps", as_list(value)
-    entries, between = as_list(value["table"]), value.get("between")
-    whole = value.keys() == {"table", "between"} and entries is not None
-    return between if whole and isinstance(between, str) else None, entries
 
 
 def as_list(value: object) -> list | None:
@@ -705,6 +693,16 @@ def _conversion(from_unit: str, unit: str) -> Fraction:
     return _by_pint(from_unit, unit) if factor is None else factor
 
 
+def _by_pint(from_unit: str, unit: str) -> Fraction:
+    """Like `_conversion`, for any unit."""
+    try:
+        powers = re.sub(r"(?<=[^\W\d])(?=-?[1-9])", "^", re.sub("^ ?/", "1/", from_unit))
+        one = _registry().Quantity(Fraction(1), _registry().Unit(powers))
+        return Fraction(one.to(unit).magnitude)
+    except Exception as error:  # pint lets errors of its parser through: of tokens, of types, ...
+        raise ValueError(f"{from_unit} is not convertible to {unit}") from error
+
+
 def _has_dimensionless_factor(unit: str) -> bool:
     """Whether a unit has a factor without dimension, such as "percent" or "deg"."""
     return any(_is_dimensionless(factor["name"]) for factor in exact.FACTOR.finditer(unit))
@@ -729,27 +727,10 @@ def _unfit(from_unit: str, unit: str) -> str:
         return NO_PARTS
     for factor in exact.FACTOR.finditer(from_unit):
         rest = from_unit[:factor.start()] + from_unit[factor.end():]
-        if _converts(rest.lstrip(" *"), unit):
+        with suppress(ValueError):
+            _conversion(rest.lstrip(" *"), unit)
             return f'"{factor[0].strip(" */")}" is not accepted in this unit'
     return f'"{from_unit}" is not a unit of this kind'
-
-
-def _converts(from_unit: str, unit: str) -> bool:
-    try:
-        return bool(_conversion(from_unit, unit))
-    except ValueError:
-        return False
-
-
-def _by_pint(from_unit: str, unit: str) -> Fraction:
-    """Like `_conversion`, for any unit."""
-    registry = _registry()
-    try:
-        powers = re.sub(r"(?<=[^\W\d])(?=-?[1-9])", "^", re.sub("^ ?/", "1/", from_unit))
-        one = registry.Quantity(Fraction(1), registry.Unit(powers))
-        return Fraction(one.to(unit).magnitude)
-    except Exception as error:  # pint lets errors of its parser through: of tokens, of types, ...
-        raise ValueError(f"{from_unit} is not convertible to {unit}") from error
 
 
 @cache

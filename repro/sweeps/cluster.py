@@ -12,12 +12,12 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 
+from repro.errors import OutputError
+from repro.scene.needed import package
 from repro.sweeps import pool, single_run
 from repro.sweeps.design import Point
-from repro.sweeps.folder import SweepError
 from repro.sweeps.pool import EndedRuns, RunPoints
 
 PACKAGE = "distributed"
@@ -36,7 +36,7 @@ def ready(address: str) -> Iterator[RunPoints]:
     """Connect to the scheduler at an address like tcp://host:8786; yields a function that makes
     runs on its workers.
 
-    Raises SweepError within seconds, before anything is written, if no scheduler answers or the
+    Raises OutputError within seconds, before anything is written, if no scheduler answers or the
     package ``distributed`` is not installed.
     """
     distributed = _package(address)
@@ -44,18 +44,17 @@ def ready(address: str) -> Iterator[RunPoints]:
         with ThreadPoolExecutor(1) as thread:  # a notebook has its own event loop in this one
             thread.submit(lambda: asyncio.run(_ask(distributed, address))).result()
     except Exception as error:  # another kind of server may cause any error
-        raise SweepError(f"--scheduler {address}: no Dask scheduler answers there; an address such "
-                         "as tcp://host:8786 is needed") from error
+        raise OutputError(f"--scheduler {address}: no Dask scheduler answers there; an address "
+                          "such as tcp://host:8786 is needed") from error
     with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
         yield partial(run_points, client=client, address=address)
 
 
 def _package(address: str):
     try:
-        return import_module(PACKAGE)
-    except ImportError:
-        raise SweepError(f"--scheduler {address}: the package {PACKAGE} is not installed; "
-                         f"pip install {PACKAGE}") from None
+        return package(PACKAGE)
+    except ImportError as error:
+        raise OutputError(f"--scheduler {address}: {error}") from None
 
 
 async def _ask(distributed, address: str) -> None:
@@ -68,8 +67,8 @@ async def _ask(distributed, address: str) -> None:
 def run_points(points: Sequence[Point], folder: Path, client, address: str) -> EndedRuns:
     """Make the runs in `folder`.
 
-    Raises SweepError if the cluster has no workers, or if they have another version of this package
-    or do not share the folder.
+    Raises OutputError if the cluster has no workers, or if they have another version of this
+    package or do not share the folder.
     """
     folder = folder.resolve()
     _check_workers(client, folder, address)
@@ -78,22 +77,23 @@ def run_points(points: Sequence[Point], folder: Path, client, address: str) -> E
 
 
 def _check_workers(client, folder: Path, address: str) -> None:
-    """Raise SweepError unless workers with this version of the package see the folder."""
+    """Raise OutputError unless workers with this version of the package see the folder."""
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
-        raise SweepError(f"--scheduler {address}: it has no workers") from None
+        raise OutputError(f"--scheduler {address}: it has no workers") from None
     try:
         answers = client.run(inspect_worker, str(folder.parent / "sweep.json"))
     except ImportError as error:
-        raise SweepError(f"--scheduler {address}: a worker lacks this package ({error})") from None
+        raise OutputError(f"--scheduler {address}: a worker lacks this package ({error})") from None
     for worker, (worker_code, shared) in answers.items():
         if worker_code != single_run.code():
-            raise SweepError(f"--scheduler {address}: the worker {worker} has version {worker_code}"
-                             f" of this package, this is {single_run.code()}; the same is needed")
+            raise OutputError(f"--scheduler {address}: the worker {worker} has version "
+                              f"{worker_code} of this package, this is {single_run.code()}; the "
+                              "same is needed")
         if not shared:
-            raise SweepError(f"--scheduler {address}: the worker {worker} does not see {folder}; a "
-                             "folder on a file system that all share is needed")
+            raise OutputError(f"--scheduler {address}: the worker {worker} does not see {folder}; "
+                              "a folder on a file system that all share is needed")
 
 
 def inspect_worker(path: str) -> tuple[str, bool]:

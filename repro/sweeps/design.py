@@ -114,9 +114,8 @@ def _refused(text: str, accepted: str) -> SceneError:
 def _range(text: str, key: str, rest: str) -> Factor:
     low, high, spacing, count = (*(part.strip() for part in rest.split(":", 3)), "", "", "")[:4]
     (start, first_unit), (end, unit) = number(low), number(high)
-    if not (start and end) or first_unit:
-        raise _refused(text, EXPECTED_FORM)
-    if spacing not in ("linear", "log") or not re.fullmatch("[0-9]{0,9}", count):
+    if (not (start and end) or first_unit or spacing not in ("linear", "log")
+            or not re.fullmatch("[0-9]{0,9}", count)):
         raise _refused(text, EXPECTED_FORM)
     first, last = float(start), float(end)
     if not first < last < math.inf:
@@ -130,15 +129,15 @@ def _range(text: str, key: str, rest: str) -> Factor:
 
 def _list(text: str, key: str, rest: str) -> Factor:
     items = [bare(item.strip()) for item in rest.split(",")]
-    numbers = [number(item) for item in items]
-    if "" in items or len({(bool(digits), unit) for digits, unit in numbers}) > 1:
+    (numeric, unit), *others = {(bool(digits), unit) for digits, unit in map(number, items)}
+    if "" in items or others:
         raise _refused(text, "values in one and the same unit, or words, are needed")
-    if not numbers[0][0]:
+    if not numeric:
         return Factor(key, "", tuple(items))
-    values = tuple(float(digits) for digits, _ in numbers)
+    values = tuple(float(number(item)[0]) for item in items)
     if not all(map(math.isfinite, values)):
         raise _refused(text, "finite numbers are needed")
-    return Factor(key, numbers[0][1], values)
+    return Factor(key, unit, values)
 
 
 def bare(item: str) -> str:
@@ -216,15 +215,14 @@ def points(source: Source, sets: list[str], factors: list[Factor], combinations:
     runs: list[Point] = []
     first: dict[str, int] = {}
     for index, values in enumerate(combinations, 1):
-        run_label = label(factors, values)
-        tables = load_tables(source, sets, unset)
-        scene = _scene(label_of(source), tables, factors, values,
-                       f"{origin} {index} ({run_label})")
+        run_label = f"{origin} {index} ({label(factors, values)})"
+        scene = _scene(label_of(source), load_tables(source, sets, unset), factors, values,
+                       run_label)
         point = Point(index, values, scene)
-        twin = first.setdefault(scene_hash(point.scene), index)
+        twin = first.setdefault(point.hash, index)
         if twin != index:
-            raise SceneError(f"{origin} {index} ({run_label}): the same scene as run {twin}; each "
-                             "run once is accepted")
+            raise SceneError(f"{run_label}: the same scene as run {twin}; each run once is "
+                             "accepted")
         runs.append(point)
     return runs
 
@@ -238,7 +236,7 @@ def _check_keys(sets: list[str], varied: list[str]) -> None:
         for partner in set(partners) & set(varied):
             raise SceneError(f"--vary {key}: it and {partner} exclude each other; one of them is "
                              "accepted")
-        if any(other in (key, *partners) for other in sets):
+        if {key, *partners} & set(sets):
             named = " or ".join((key, *partners))
             raise SceneError(f"--set of {named}: it is not accepted beside --vary {key}, which "
                              "replaces it")

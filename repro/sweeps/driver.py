@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 from repro.results import drawing
 from repro.results.quantities import unit_of
-from repro.results.tables import package
 from repro.runs.folder import folder_errors
 from repro.runs.machine import refuse_exchanged, require_packages
 from repro.runs.scripts import load_run
 from repro.scene import SceneError, Source, label
 from repro.scene.arguments import Overrides, typed
+from repro.scene.needed import package
 from repro.sweeps import cluster, design, own_points, page, pool, table
-from repro.sweeps.folder import Sweep, SweepError, lock_folder
+from repro.sweeps.folder import Sweep, lock_folder
 from repro.timing import progress_bar
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def sweep(scene: Source, vary: Sequence[str] = (), folder: str | Path | None = N
     """
     if folder is None:
         raise SceneError("--out: a folder is needed")
-    _refuse_values(workers, seed, clogged)
+    refuse_values(workers, seed, clogged)
     swept = plan(scene, vary, folder, overrides, points, unset, samples, seed)
     with ready(scheduler, min(workers or pool.cores(), len(swept.points))) as run_points:
         for point in swept.points if scheduler is None else ():
@@ -243,14 +243,15 @@ def plan(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Over
     return Sweep(Path(folder), label(scene), factors, runs)
 
 
-def _refuse_values(workers: int | None, seed: int, clogged: float) -> None:
+def refuse_values(workers: int | None, seed: int, clogged: float) -> None:
     """Raise SceneError for a value of an argument of :func:`sweep` that is out of range."""
-    if workers is not None and workers < 1:
-        raise SceneError(f"workers {workers}: an integer, one or more, is needed")
-    if seed < 0:
-        raise SceneError(f"--seed {seed}: an integer, zero or more, is needed")
-    if not 0 < clogged < 1:
-        raise SceneError(f"clogged {clogged}: a number between 0 and 1 is needed")
+    accepted = {f"workers {workers}: an integer, one or more, is needed":
+                workers is None or workers >= 1,
+                f"--seed {seed}: an integer, zero or more, is needed": seed >= 0,
+                f"clogged {clogged}: a number between 0 and 1 is needed": 0 < clogged < 1}
+    for message, holds in accepted.items():
+        if not holds:
+            raise SceneError(message)
 
 
 def run_plan(plan: Sweep, run_points: pool.RunPoints, clogged: float = CLOGGED,
@@ -260,22 +261,31 @@ def run_plan(plan: Sweep, run_points: pool.RunPoints, clogged: float = CLOGGED,
     Raises OutputError if the folder cannot be used.
     """
     statuses: dict[int, str] = {}
+    total = len(plan.points)
+
+    def report(event: str, done: int, **parts: Any) -> None:
+        show(done, total)
+        if tell:
+            tell({"event": event, "done": done, "total": total, **parts})
+
     with lock_folder(plan), progress_bar(progress, "runs") as show:
         try:
-            _run_missing(plan, run_points, statuses, _reporter(show, tell))
+            missing = plan.missing()
+            completed = total - len(missing)
+            report("start", completed, scene=plan.source)
+            begun = monotonic()
+            with closing(run_points(missing, plan.runs)) as ended_runs:
+                for point, status in ended_runs if missing else ():
+                    statuses[point.index] = status
+                    left = (monotonic() - begun) * (len(missing) / len(statuses) - 1)
+                    report("run", completed + len(statuses), run=point.index, status=status,
+                           values=design.label(plan.factors, point.values), left_s=left)
         finally:
-            swept_runs = _write_results(plan, statuses, clogged)
-    return Swept(plan.source, plan.folder, plan.factors, swept_runs)
-
-
-def _reporter(show: Callable[[float, float], None], tell: Tell | None) -> Tell:
-    """Make the receiver of events: the bar, then the caller's own."""
-    def report(event: dict[str, Any]) -> None:
-        show(event["done"], event["total"])
-        if tell:
-            tell(event)
-
-    return report
+            runs = table.read_runs(plan, statuses, clogged)
+            with folder_errors(plan.folder):
+                table.write(plan, runs)
+                page.write(plan, runs, clogged)
+    return Swept(plan.source, plan.folder, plan.factors, runs)
 
 
 def ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.RunPoints]:
@@ -283,31 +293,3 @@ def ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.Ru
     if scheduler:
         return cluster.ready(scheduler)
     return nullcontext(partial(pool.run_points, workers=workers))
-
-
-def _run_missing(plan: Sweep, run_points: pool.RunPoints, statuses: dict[int, str],
-                 tell: Tell) -> None:
-    """Make the missing runs; adds the status of each to `statuses`, by its number."""
-    missing = plan.missing()
-    total = len(plan.points)
-    completed = total - len(missing)
-    tell({"event": "start", "scene": plan.source, "done": completed, "total": total})
-    if not missing:
-        return
-    begun = monotonic()
-    with closing(run_points(missing, plan.runs)) as ended_runs:
-        for point, status in ended_runs:
-            statuses[point.index] = status
-            tell({"event": "run", "done": completed + len(statuses), "total": total,
-                  "run": point.index, "values": design.label(plan.factors, point.values),
-                  "status": status,
-                  "left_s": (monotonic() - begun) * (len(missing) / len(statuses) - 1)})
-
-
-def _write_results(plan: Sweep, statuses: dict[int, str], clogged: float) -> table.Runs:
-    """Read the runs, and write the tables and the page."""
-    runs = table.read_runs(plan, statuses, clogged)
-    with folder_errors(plan.folder, SweepError):
-        table.write(plan, runs)
-        page.write(plan, runs, clogged)
-    return runs

@@ -21,10 +21,6 @@ from repro.sweeps import single_run
 from repro.sweeps.design import Factor, Point
 
 
-class SweepError(OutputError):
-    """A sweep cannot run in this folder or on this cluster."""
-
-
 @dataclass(frozen=True)
 class Sweep:
     """The plan of a sweep: its folder, the name of the scene, the varied keys, and the runs."""
@@ -53,12 +49,12 @@ def lock_folder(sweep: Sweep):
     or if it cannot be written.
     """
     refuse_null(sweep.folder)
-    with folder_errors(sweep.folder, SweepError):
-        _check(sweep.folder, _as_json(sweep))
+    with folder_errors(sweep.folder):
+        _check(sweep)
         _refuse_foreign(sweep)
     with locked(sweep.folder):
-        with folder_errors(sweep.folder, SweepError):
-            _check(sweep.folder, _as_json(sweep))  # again: another sweep may have begun meanwhile
+        with folder_errors(sweep.folder):
+            _check(sweep)  # again: another sweep may have begun meanwhile
             sweep.runs.mkdir(exist_ok=True)
             with atomic_path(sweep.folder / "sweep.json") as beside:
                 write_json(beside, _as_json(sweep))
@@ -72,56 +68,46 @@ def _as_json(sweep: Sweep) -> dict:
     return {"scene": sweep.source, "code": single_run.code(), "varied": factors, "points": points}
 
 
-def _check(folder: Path, expected: dict) -> None:
-    """Raise SweepError if the folder belongs to another sweep or to something else."""
+def _check(sweep: Sweep) -> None:
+    """Raise OutputError if the folder belongs to another sweep or to something else."""
+    folder, expected = sweep.folder, _as_json(sweep)
     if folder.is_dir() and not os.path.lexists(folder / "sweep.json"):
         foreign = sorted({path.name for path in folder.iterdir()} - {"runs", LOCK})
         if foreign:
-            raise SweepError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a sweep; a "
-                             "new or empty folder, or one of the same sweep, is accepted")
-    elif folder.exists():
-        _compare(folder, _read(folder), expected)
-
-
-def _read(folder: Path) -> dict:
+            raise OutputError(f"--out {folder}: it holds {foreign[0]!r}, which is not of a sweep; "
+                              "a new or empty folder, or one of the same sweep, is accepted")
+        return
+    if not folder.exists():
+        return
     try:
         record = read_json(folder / "sweep.json")
-        len(record["points"])  # raises TypeError where it is no list
-        return {name: record[name] for name in ("scene", "code", "varied", "points")}
+        runs = len(record["points"])  # raises TypeError where it is no list
+        scene, code, *plan = (record[name] for name in expected)
     except (OSError, ValueError, KeyError, TypeError) as error:
         reason = f" ({error.strerror})" if isinstance(error, OSError) else ""
-        raise SweepError(f"--out {folder}: its sweep.json cannot be read{reason}; a new folder is "
-                         "needed") from None
-
-
-def _compare(folder: Path, record: dict, expected: dict) -> None:
-    if record["code"] != expected["code"]:
-        raise SweepError(f"--out {folder}: its sweep was begun with version {record['code']} of "
-                         f"this package, this is {expected['code']}; a new folder is needed")
-    if (record["varied"], record["points"]) != (expected["varied"], expected["points"]):
-        raise SweepError(f"--out {folder}: it holds another sweep ({record['scene']}, "
-                         f"{len(record['points'])} runs); a new folder, or the same scene, --set, "
-                         "--vary, --samples and --seed, is needed")
+        raise OutputError(f"--out {folder}: its sweep.json cannot be read{reason}; a new folder is "
+                          "needed") from None
+    if code != expected["code"]:
+        raise OutputError(f"--out {folder}: its sweep was begun with version {code} of "
+                          f"this package, this is {expected['code']}; a new folder is needed")
+    if plan != [expected["varied"], expected["points"]]:
+        raise OutputError(f"--out {folder}: it holds another sweep ({scene}, {runs} runs); a new "
+                          "folder, or the same scene, --set, --vary, --samples and --seed, is "
+                          "needed")
 
 
 def _refuse_foreign(sweep: Sweep) -> None:
-    """Raise SweepError if the folder of a run, or of all runs, is a link or not a folder, or holds
+    """Raise OutputError if the folder of a run, or of all runs, is a link or not a folder, or holds
     files that do not belong to the run."""
-    for folder in (sweep.runs, *(sweep.runs / point.name for point in sweep.points)):
+    folders = {sweep.runs / point.name: point for point in sweep.points}
+    for folder in (sweep.runs, *folders):
         if os.path.lexists(folder) and not is_folder(folder):
-            raise SweepError(f"{folder}: it is a link, or no folder, and so not of this sweep; "
-                             "move it away")
-    for point in sweep.points:
-        if (sweep.runs / point.name).exists():
-            _refuse_other_run(sweep.runs / point.name, point)
-
-
-def _refuse_other_run(folder: Path, point: Point) -> None:
-    """Raise SweepError if a folder holds files that do not belong to the run of a point."""
-    if not os.path.lexists(folder / PROVENANCE):
-        if foreign := find_foreign(folder):
-            raise SweepError(f"{folder}: it holds {foreign[0]!r}, which is not of a run; move it "
-                             "away")
-        return
-    if read_record(folder)["hash"] != point.hash:
-        raise SweepError(f"{folder}: it holds the run of another scene; move it away")
+            raise OutputError(f"{folder}: it is a link, or no folder, and so not of this sweep; "
+                              "move it away")
+    for folder, point in folders.items():
+        if os.path.lexists(folder / PROVENANCE):
+            if read_record(folder)["hash"] != point.hash:
+                raise OutputError(f"{folder}: it holds the run of another scene; move it away")
+        elif folder.exists() and (foreign := find_foreign(folder)):
+            raise OutputError(f"{folder}: it holds {foreign[0]!r}, which is not of a run; move it "
+                              "away")

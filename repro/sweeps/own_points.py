@@ -58,24 +58,19 @@ def _columns(points: Any) -> Iterable[tuple] | None:
     Missing fields are empty.
     """
     if isinstance(points, (str, PathLike)):
-        return zip_longest(*_read_csv(str(points)), fillvalue="")
+        try:
+            with open(points, encoding="utf-8-sig", newline="") as lines:
+                return zip_longest(*filter(None, csv.reader(lines)), fillvalue="")
+        except (OSError, ValueError, csv.Error) as error:
+            raise SceneError(f"{points}: it cannot be read as a CSV file ({error})") from None
     if isinstance(points, Mapping):
-        rows = zip_longest(*points.values(), fillvalue="")
-        return zip(points, *rows)
+        return zip(points, *zip_longest(*points.values(), fillvalue=""))
     names = getattr(points, "columns", getattr(getattr(points, "dtype", None), "names", None))
     return None if names is None else zip(names, *np.asarray(points, object).tolist())
 
 
-def _read_csv(file: str) -> list[list[str]]:
-    try:
-        with open(file, encoding="utf-8-sig", newline="") as lines:
-            return [line for line in csv.reader(lines) if line]
-    except (OSError, ValueError, csv.Error) as error:
-        raise SceneError(f"{file}: it cannot be read as a CSV file ({error})") from None
-
-
 def _tabulated(file: str, columns: Iterable[tuple]) -> list[Factor]:
-    """Return the factors of named columns."""
+    """Return the factors of named columns: numbers in one unit, or words."""
     factors: list[Factor] = []
     for name, *cells in columns:
         match = HEAD.fullmatch(str(name))
@@ -83,23 +78,18 @@ def _tabulated(file: str, columns: Iterable[tuple]) -> list[Factor]:
         if not match or match[1] in [factor.key for factor in factors]:
             raise SceneError(f"{file}: row 0, {place}: a key that no other column has, with its "
                              'unit, is needed, such as "pore.width (um)"')
-        factors.append(_factor(file, place, match[1], match[2] or "", cells))
+        texts = [bare(str(plain(cell)).strip()) for cell in cells]
+        parts = [number(f"{text} {match[2] or ''}".strip()) for text in texts]
+        kinds = [(bool(digits), unit) for digits, unit in parts]
+        for row, (text, (digits, _)) in enumerate(zip(texts, parts), 1):
+            infinite = digits and math.isinf(float(digits))
+            if text.lower() in NO_VALUE or infinite or kinds[row - 1] != kinds[0]:
+                raise SceneError(f"{file}: row {row}, {place}: {quote(text)}: a finite number in "
+                                 "the unit of row 1, or a word as there, is needed")
+        numeric, unit = kinds[0] if kinds else (False, "")
+        values = [float(digits) for digits, _ in parts] if numeric else texts
+        factors.append(Factor(match[1], unit if numeric else "", tuple(values)))
     return factors
-
-
-def _factor(file: str, place: str, key: str, unit: str, cells: list) -> Factor:
-    """Return the factor of a column: numbers in one unit, or words."""
-    texts = [bare(str(plain(cell)).strip()) for cell in cells]
-    parts = [number(f"{text} {unit}".strip()) for text in texts]
-    kinds = [(bool(digits), own) for digits, own in parts]
-    for row, (text, (digits, _)) in enumerate(zip(texts, parts), 1):
-        infinite = digits and math.isinf(float(digits))
-        if text.lower() in NO_VALUE or infinite or kinds[row - 1] != kinds[0]:
-            raise SceneError(f"{file}: row {row}, {place}: {quote(text)}: a finite number in the "
-                             "unit of row 1, or a word as there, is needed")
-    if not any(digits for digits, _ in parts):
-        return Factor(key, "", tuple(texts))
-    return Factor(key, parts[0][1], tuple(float(digits) for digits, _ in parts))
 
 
 def _scaled(points: Any, factors: list[Factor], samples: int | None) -> list[tuple]:

@@ -5,7 +5,8 @@ The page needs no network.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from html import escape
 
 import numpy as np
@@ -16,7 +17,6 @@ from repro.report.colours import viridis
 from repro.results import write_text
 from repro.results.files import atomic_path
 from repro.results.names import ANSWER, KNOWN
-from repro.results.quantities import Quantity
 from repro.sweeps.design import Factor, label
 from repro.sweeps.folder import Sweep
 from repro.sweeps.table import NUMBERS, SweepRun
@@ -56,25 +56,21 @@ interpolated; <code>output.times</code> adds rows.</p>
 
 def _colours() -> str:
     """The colours of lines and dots, as rules of style."""
-    dark = _rules(viridis(LEVELS, *ON_DARK))
-    return f"{_rules(viridis(LEVELS, *ON_LIGHT))}@media (prefers-color-scheme: dark) {{\n{dark}}}\n"
-
-
-def _rules(colours: list[str]) -> str:
-    return "".join(f".line{k} {{ stroke: {colour}; }} .dot{k} {{ fill: {colour}; }}\n"
-                   for k, colour in enumerate(colours))
+    light, dark = ("".join(f".line{k} {{ stroke: {colour}; }} .dot{k} {{ fill: {colour}; }}\n"
+                           for k, colour in enumerate(colours))
+                   for colours in (viridis(LEVELS, *ON_LIGHT), viridis(LEVELS, *ON_DARK)))
+    return f"{light}@media (prefers-color-scheme: dark) {{\n{dark}}}\n"
 
 
 def _describe(factor: Factor) -> str:
     values = list(dict.fromkeys(factor.values))
-    if factor.spacing == "list" and (len(values) <= 2 * LEVELS or not factor.numeric):
+    first, last = factor.short(min(values)), factor.short(max(values))
+    if factor.spacing != "list":
+        count = f", {factor.count} values" if factor.count else ""
+        return f"{factor.key}: {first} to {last}, {factor.spacing}{count}"
+    if len(values) <= 2 * LEVELS or not factor.numeric:
         return f"{factor.key}: {', '.join(map(factor.short, values))}"
-    if factor.spacing == "list":
-        first, last = factor.short(min(values)), factor.short(max(values))
-        return f"{factor.key}: {len(values)} values from {first} to {last}"
-    count = f", {factor.count} values" if factor.count else ""
-    first, last = map(factor.short, factor.values)
-    return f"{factor.key}: {first} to {last}, {factor.spacing}{count}"
+    return f"{factor.key}: {len(values)} values from {first} to {last}"
 
 
 def _is_logarithmic(factor: Factor) -> bool:
@@ -99,23 +95,28 @@ def _level(factor: Factor, value: float | str) -> int:
 
 
 def _key(factor: Factor, runs: list[SweepRun], k: int) -> str:
-    """The legend of the colours."""
-    values = sorted({run.point.values[k] for run in runs},
-                    key=lambda value: _number(factor, value))
+    """The legend of the colours: values, each beside a line in its colour."""
+    values = sorted({run.point.values[k] for run in runs}, key=partial(_number, factor))
     if len(values) > 2 * LEVELS:
         last = len(values) - 1
         values = [values[round(i * last / (LEVELS - 1))] for i in range(LEVELS)]
-    entries = "".join(_entry(factor, value) for value in values)
+    entries = "".join(f"<li>{charts.swatch(_level(factor, value))}"
+                      f"{escape(factor.short(value))}</li>" for value in values)
     return f'<ul class="key"><li>{escape(factor.key)}</li>{entries}</ul>'
-
-
-def _entry(factor: Factor, value: float | str) -> str:
-    """A value in the legend, beside a line in its colour."""
-    return f"<li>{charts.swatch(_level(factor, value))}{escape(factor.short(value))}</li>"
 
 
 def _run_title(sweep: Sweep, run: SweepRun) -> str:
     return f"run {run.point.index}: {label(sweep.factors, run.point.values)}"
+
+
+def _pictures(sweep: Sweep, title: str, runs: list[SweepRun], needs: str,
+              draw: Callable[[list[SweepRun], int], str], note: str = "") -> str:
+    """A section with a chart of runs for each varied key, by its number; needs: the parts that no
+    run has together if there is no run to draw."""
+    if not runs:
+        return html.section(title, f'<p class="note">No run has both {needs}.</p>')
+    figures = "".join(f"<figure>{draw(runs, k)}</figure>" for k in range(len(sweep.factors)))
+    return html.section(title, note, f'<div class="pictures">{figures}</div>')
 
 
 def _conductivity(sweep: Sweep, runs: list[SweepRun]) -> str:
@@ -124,25 +125,16 @@ def _conductivity(sweep: Sweep, runs: list[SweepRun]) -> str:
     Each varied key has a chart that is coloured by it.
     """
     plotted = [run for run in runs
-             if np.isfinite(run.relative).any() and np.isfinite(run.biomass).any()]
-    figures = [_coloured(sweep, plotted, k) for k in range(len(sweep.factors)) if plotted]
-    return _pictures("Conductivity against biomass", figures, "a flow and an aggregate")
-
-
-def _pictures(title: str, figures: list[str], needs: str, note: str = "") -> str:
-    """A section of charts; needs: the parts that no run has together if there is no chart."""
-    if not figures:
-        return html.section(title, f'<p class="note">No run has both {needs}.</p>')
-    pictures = "".join(f"<figure>{figure}</figure>" for figure in figures)
-    return html.section(title, note, f'<div class="pictures">{pictures}</div>')
+               if np.isfinite(run.relative).any() and np.isfinite(run.biomass).any()]
+    return _pictures(sweep, "Conductivity against biomass", plotted, "a flow and an aggregate",
+                     partial(_coloured, sweep))
 
 
 def _coloured(sweep: Sweep, plotted: list[SweepRun], k: int) -> str:
     """A chart with one line for each run, coloured by factor k."""
     factor = sweep.factors[k]
-    biomass = np.concatenate([run.biomass for run in plotted])
-    relative = np.concatenate([run.relative for run in plotted])
-    x, y = charts.across(*_ends(biomass)), charts.upwards(*_ends(relative))
+    x = charts.across(*_ends(np.concatenate([run.biomass for run in plotted])))
+    y = charts.upwards(*_ends(np.concatenate([run.relative for run in plotted])))
     lines = [charts.curve(x, y, run.biomass, run.relative, _level(factor, run.point.values[k]),
                           _run_title(sweep, run)) for run in plotted]
     axes = "biomass: aggregate area / pore area", "conductivity / initial conductivity"
@@ -162,13 +154,12 @@ def _ends(values) -> tuple[float, float, bool]:
 def _clogging(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:
     """Clogging time against each varied key, coloured by the next one."""
     plotted = [run for run in runs
-             if _time(run) > 0 and (run.is_over or run.numbers["clogging_time_h"])]
+               if _time(run) > 0 and (run.is_over or run.numbers["clogging_time_h"])]
     axis = f"time to {clogged:g} of the conductivity (h)"
-    figures = [_against(sweep, plotted, k, _time, axis, "Clogging time")
-               for k in range(len(sweep.factors)) if plotted]
     note = ('<p class="note">A hollow triangle stands at the end of a run that was not clogged by '
             "then.</p>")
-    return _pictures("Clogging time", figures, "a flow and a length in time", note)
+    return _pictures(sweep, "Clogging time", plotted, "a flow and a length in time",
+                     partial(_against, sweep, _time, axis, "Clogging time"), note)
 
 
 def _last(sweep: Sweep, runs: list[SweepRun]) -> str:
@@ -176,50 +167,41 @@ def _last(sweep: Sweep, runs: list[SweepRun]) -> str:
 
     Unlike the time of clogging, this value exists for a pore that does not clog.
     """
-    with_rows = [run for run in runs if len(run.times)]
-    flowing = [run for run in with_rows if np.isfinite(run.relative).any()]
-    plotted = flowing or [run for run in with_rows if np.isfinite(run.biomass).any()]
+    flowing = [run for run in runs if np.isfinite(run.relative).any()]
+    plotted = flowing or [run for run in runs if np.isfinite(run.biomass).any()]
     axis = "conductivity / initial conductivity" if flowing else "aggregate area / pore area"
-    figures = [_against(sweep, plotted, k, _last_relative if flowing else _last_biomass, axis,
-                        "Last row of each run") for k in range(len(sweep.factors)) if plotted]
-    return _pictures("At the end of each run", figures, "rows and a flow or an aggregate")
+    draw = partial(_against, sweep, lambda run: (run.relative if flowing else run.biomass)[-1],
+                   axis, "Last row of each run")
+    return _pictures(sweep, "At the end of each run", plotted, "rows and a flow or an aggregate",
+                     draw)
 
 
-def _last_relative(run: SweepRun) -> float:
-    return float(run.relative[-1])
-
-
-def _last_biomass(run: SweepRun) -> float:
-    return float(run.biomass[-1])
-
-
-def _against(sweep: Sweep, plotted: list[SweepRun], k: int, value: Callable[[SweepRun], float],
-             axis: str, title: str) -> str:
+def _against(sweep: Sweep, value: Callable[[SweepRun], float], axis: str, title: str,
+             plotted: list[SweepRun], k: int) -> str:
     """A value of each run against varied key k, coloured by the next one. A triangle marks a run
     that ends before it clogs."""
     factor, colour_index = sweep.factors[k], (k + 1) % len(sweep.factors)
+    coloured_by = sweep.factors[colour_index]
     x = _across(factor, [_number(factor, run.point.values[k]) for run in plotted])
     y = charts.upwards(*_ends([value(run) for run in plotted]))
-    lines: list[str] = []
     marks: list[str] = []
     series: dict[tuple, tuple[int, list]] = {}
     for run in sorted(plotted, key=lambda run: _number(factor, run.point.values[k])):
         reached = value is not _time or run.numbers["clogging_time_h"] is not None
         place = charts.point(x(_number(factor, run.point.values[k])), y(value(run)))
-        level = _level(sweep.factors[colour_index], run.point.values[colour_index])
+        level = _level(coloured_by, run.point.values[colour_index])
         unit = " h" if value is _time else ""
         text = f"{_run_title(sweep, run)}: {'' if reached else 'after '}{value(run):.4g}{unit}"
         marks.append(charts.dot(place, level, text, RADIUS) if reached else
                      charts.triangle(place, level, text))
         rest = run.point.values[:k] + run.point.values[k + 1:]
         series.setdefault(rest, (level, []))[1].extend([place] if reached else [])
-    if len(sweep.factors) > 1:
-        lines = [charts.polyline(places, level)
-                 for level, places in series.values() if len(places) > 1]
-    key = _key(sweep.factors[colour_index], plotted, colour_index) if colour_index != k else ""
-    axes = _axis_title(factor), axis
-    label = f"{title} against {factor.key}"
-    return charts.drawing(x, y, axes, label, "".join(lines + marks)) + key
+    lines = [charts.polyline(places, level) for level, places in series.values()
+             if len(places) > 1 < len(sweep.factors)]
+    key = _key(coloured_by, plotted, colour_index) if colour_index != k else ""
+    name = f"{factor.key} ({factor.unit})" if factor.unit else factor.key
+    return charts.drawing(x, y, (name, axis), f"{title} against {factor.key}",
+                          "".join(lines + marks)) + key
 
 
 def _across(factor: Factor, numbers: list[float]) -> charts.Scale:
@@ -228,11 +210,6 @@ def _across(factor: Factor, numbers: list[float]) -> charts.Scale:
         return charts.across(-0.5, len(factor.values) - 0.5, words=factor.values)
     log = _is_logarithmic(factor)
     return charts.across(*charts.padded(numbers, log), log)
-
-
-def _axis_title(factor: Factor) -> str:
-    """A key and its unit."""
-    return f"{factor.key} ({factor.unit})" if factor.unit else factor.key
 
 
 def _time(run: SweepRun) -> float:
@@ -248,35 +225,24 @@ def _time(run: SweepRun) -> float:
 
 def _table(sweep: Sweep, runs: list[SweepRun]) -> str:
     quantities = KNOWN | {each.name: each for each in NUMBERS}
-    shown = [name for name in TABLE_NUMBERS if any(_value(run, name) is not None for run in runs)]
-    names = ["run", *(factor.key for factor in sweep.factors),
-             *(_heading(quantities[name]) for name in shown)]
+    values = [run.numbers | run.final for run in runs]
+    shown = [name for name in TABLE_NUMBERS if any(each.get(name) is not None for each in values)]
+    names = ["run", *(factor.key for factor in sweep.factors)]
+    for number in map(quantities.__getitem__, shown):
+        symbol = number.unit.symbol
+        names.append(f"{number.label} ({symbol})" if symbol else number.label)
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
-    rows = "".join(_row(sweep, run, shown) for run in runs)
+    rows = "".join(_row(sweep, run, map(each.get, shown)) for run, each in zip(runs, values))
     failures = "".join(f'<li class="bad">run {run.point.index}: {escape(run.status)}</li>'
                        for run in runs if not run.is_over)
     return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
             f"</div><ul>{failures}</ul>")
 
 
-def _heading(number: Quantity) -> str:
-    """The heading of a number, such as "end (h)"."""
-    return f"{number.label} ({number.unit.symbol})" if number.unit.symbol else number.label
-
-
-def _value(run: SweepRun, name: str) -> float | None:
-    """An event of a run, or the last value of a column."""
-    return run.numbers[name] if name in run.numbers else run.final.get(name)
-
-
-def _row(sweep: Sweep, run: SweepRun, shown: list[str]) -> str:
-    values = [factor.short(value) for factor, value in zip(sweep.factors, run.point.values)]
-    numbers = [_short(_value(run, name)) for name in shown]
-    cells = "".join(f"<td>{escape(text)}</td>" for text in (*values, *numbers))
+def _row(sweep: Sweep, run: SweepRun, numbers: Iterable[float | None]) -> str:
+    texts = [factor.short(value) for factor, value in zip(sweep.factors, run.point.values)]
+    texts += ["" if value is None else f"{value:.4g}" for value in numbers]
+    cells = "".join(f"<td>{escape(text)}</td>" for text in texts)
     link = f'<td><a href="runs/{escape(run.point.name)}/">{run.point.index}</a></td>'
     status = escape(run.status if run.is_over else run.status.partition(":")[0])
     return f'<tr>{link}{cells}<td class="text{"" if run.is_over else " bad"}">{status}</td></tr>'
-
-
-def _short(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"

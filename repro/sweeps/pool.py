@@ -16,7 +16,6 @@ from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import (
     CancelledError,
     Executor,
-    Future,
     ThreadPoolExecutor,
     as_completed,
 )
@@ -53,18 +52,14 @@ def submit(executor: Executor, make: Callable[[Point, Path], str], points: Seque
     futures = {executor.submit(make, point, folder / point.name): point for point in points}
     try:
         for future in as_completed(futures):
-            yield futures[future], _result_status(future)
+            try:
+                status = future.result()
+            except Exception as error:  # any error of an executor is a failure of its run
+                status = f"failed: {type(error).__name__}: {' '.join(str(error).split())}"
+            yield futures[future], status
     finally:
         for future in futures:
             future.cancel()
-
-
-def _result_status(future: Future[str]) -> str:
-    """Return how a run ended, or the error of the executor."""
-    try:
-        return future.result()
-    except Exception as error:  # any error of an executor is a failure of its run
-        return f"failed: {type(error).__name__}: {' '.join(str(error).split())}"
 
 
 class Processes:
@@ -85,10 +80,14 @@ class Processes:
         process = self._take()
         status = _ask(process, {"scene": point.scene.name, "tables": scene_tables(point.scene),
                                 "folder": str(folder), "patience": patience})
-        if not status:
-            return _describe_exit(process.wait())
-        self._idle.append(process)
-        return status
+        if status:
+            self._idle.append(process)
+            return status
+        code = process.wait()
+        cause = f"ended with status {code}"
+        with suppress(ValueError):
+            cause = f"was killed by {signal.Signals(-code).name}"
+        return f"failed: the process of the run {cause}"
 
     def _take(self) -> subprocess.Popen:
         """Take an idle process, or start one."""
@@ -136,11 +135,3 @@ def _ask(process: subprocess.Popen, request: dict) -> str:
         return json.loads(process.stdout.readline() or '""')
     except BrokenPipeError:
         return ""
-
-
-def _describe_exit(code: int) -> str:
-    try:
-        cause = f"was killed by {signal.Signals(-code).name}"
-    except ValueError:
-        cause = f"ended with status {code}"
-    return f"failed: the process of the run {cause}"

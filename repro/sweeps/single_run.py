@@ -41,9 +41,9 @@ def make(scene: Scene, folder: Path, patience: float = 0.0,
 
     patience: seconds to wait for another process that uses the folder; stop: returns the number of
     a signal that asks the run to stop, or 0. Returns how the run ended, in one line, also for
-    errors.
+    errors. The events of a run are ignored: its ``run.json`` has the warnings.
     """
-    watch = Watch(_ignore_event, stop=stop, stop_within=stop, patience=patience)
+    watch = Watch(lambda event: None, stop=stop, stop_within=stop, patience=patience)
     try:
         return _run_or_resume(scene, folder, watch)
     except Interrupted:
@@ -54,10 +54,6 @@ def make(scene: Scene, folder: Path, patience: float = 0.0,
         last = traceback.extract_tb(error.__traceback__)[-1]
         location = f"{Path(last.filename).name}, line {last.lineno}"
         return f"failed: {type(error).__name__}: {' '.join(str(error).split())} ({location})"
-
-
-def _ignore_event(event: dict) -> None:
-    """Ignore the events of a run: its ``run.json`` has the warnings."""
 
 
 def _run_or_resume(scene: Scene, folder: Path, watch: Watch) -> str:
@@ -82,7 +78,12 @@ def serve() -> None:
     stopping = threading.Event()
     threading.Thread(target=_read_requests, args=(requests, stopping), daemon=True).start()
     for line in iter(requests.get, STOP):
-        print(json.dumps(_answer(json.loads(line), stopping)), file=answers, flush=True)
+        request = json.loads(line)
+        scene = parse_scene(request["tables"], request["scene"], request["scene"])
+        with catch_signals() as received:
+            ended = make(scene, Path(request["folder"]), request["patience"],
+                         lambda: received() or signal.SIGTERM * stopping.is_set())
+        print(json.dumps(ended), file=answers, flush=True)
 
 
 def _read_requests(requests: SimpleQueue[str], stopping: threading.Event) -> None:
@@ -92,10 +93,3 @@ def _read_requests(requests: SimpleQueue[str], stopping: threading.Event) -> Non
                 stopping.set()
             requests.put(line)
     os._exit(1)
-
-
-def _answer(request: dict, stopping: threading.Event) -> str:
-    scene = parse_scene(request["tables"], request["scene"], request["scene"])
-    with catch_signals() as received:
-        return make(scene, Path(request["folder"]), request["patience"],
-                    lambda: received() or signal.SIGTERM * stopping.is_set())

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,8 +16,8 @@ import numpy as np
 
 from repro import results
 from repro.errors import OutputError
-from repro.results.files import atomic_path
-from repro.results.quantities import Quantity
+from repro.results.files import atomic_path, is_file
+from repro.results.quantities import Quantity, none_if_nan
 from repro.runs import status
 from repro.runs.integrity import read_scene_run
 from repro.sweeps.design import Factor, Point
@@ -27,45 +28,85 @@ SHOWN = 10
 
 
 @dataclass(frozen=True, eq=False)
-class RunSeries:
-    """The rows of a run.
+class SweepRun:
+    """The results of one run of a sweep.
 
-    times (h), relative: conductivity over its first value, biomass, touches: does the aggregate
-    touch the opposite wall; all (T,). wall: wall time (s); clogged: see :func:`clogging`; folded:
-    does the run end as a fold?
+    clogged: the relative conductivity of a clogged pore; series: the columns of its rows, empty
+    without a run; wall: wall time (s).
     """
 
-    times: np.ndarray
-    relative: np.ndarray
-    biomass: np.ndarray
-    touches: np.ndarray
-    wall: float
+    point: Point
+    status: str
     clogged: float
-    folded: bool = False
+    series: dict[str, np.ndarray] = field(default_factory=dict)
+    wall: float = math.nan
+
+    def column(self, name: str) -> np.ndarray:
+        """(T,) a column; empty without a run."""
+        return self.series.get(name, np.zeros(0))
+
+    @property
+    def times(self) -> np.ndarray:
+        """(T,) h."""
+        return self.column("time_h")
 
     @cached_property
-    def clogging(self) -> tuple[float, float]:
-        """Time (h) and biomass of :func:`clogging`, NaN if the pore has not clogged."""
-        return clogging(self.times, self.relative, self.biomass, self.clogged)
+    def relative(self) -> np.ndarray:
+        """(T,) conductivity over its first value."""
+        conductivity = self.column("conductivity_m_per_d")
+        return conductivity / conductivity[:1]
+
+    @cached_property
+    def biomass(self) -> np.ndarray:
+        """(T,) area of the aggregate over that of the pore."""
+        pore = self.point.scene.pore
+        return self.column("aggregate_area_um2") / (pore.width * pore.length)
+
+    @cached_property
+    def numbers(self) -> dict[str, float | None]:
+        """Values of COLUMNS, None if undefined."""
+        return {number.name: none_if_nan(number.reported(self)) if len(self.times) else None
+                for number in NUMBERS}
+
+    @property
+    def final(self) -> dict[str, float | None]:
+        """The last values of :func:`final_columns`, None if undefined."""
+        return {name: none_if_nan(values[-1]) for name, values in self.series.items()}
+
+    @property
+    def is_over(self) -> bool:
+        """Is the run finished?"""
+        return status.is_over(self.status)
+
+    def falls_to(self, part: float) -> tuple[float, float]:
+        """Time (h) and biomass of :func:`clogging`, NaN if the conductivity stays above a part."""
+        return clogging(self.times, self.relative, self.biomass, part)
 
     def at_contact(self, values: np.ndarray) -> float:
         """The value in the first row with contact, NaN without contact. From that row on the
         aggregate is a plug through which the fluid seeps."""
-        first = np.flatnonzero(self.touches)[:1]
+        first = np.flatnonzero(self.column("contact") > 0)[:1]
         return float(values[first[0]]) if len(first) else np.nan
 
+    def __repr__(self) -> str:
+        values = ", ".join(map(str, self.point.values))
+        end = self.numbers["end_h"]
+        reached = "" if end is None else f", to {end:.4g} h"
+        return f"<run {self.point.index} ({values}): {self.status}{reached}>"
 
-#: The columns of ``runs.csv`` after the factors; ``value`` takes a RunSeries.
+
+#: The columns of ``runs.csv`` after the factors; ``value`` takes a SweepRun.
 NUMBERS = (
     Quantity("end_h", "last time of the run", "time_h of the last row",
              lambda run: run.times[-1], "end"),
     Quantity("wall_time_s", "wall time", "that of run.json", lambda run: run.wall, "wall time"),
     Quantity("clogging_time_h", "time of clogging",
              "when conductivity_m_per_d over its first value has first fallen to --clogged; its "
-             "logarithm is linear between rows", lambda run: run.clogging[0], "clogged"),
+             "logarithm is linear between rows", lambda run: run.falls_to(run.clogged)[0],
+             "clogged"),
     Quantity("clogging_biomass", "biomass at clogging",
-             "aggregate_area_um2 / (W L) then, linear between rows", lambda run: run.clogging[1],
-             "biomass then"),
+             "aggregate_area_um2 / (W L) then, linear between rows",
+             lambda run: run.falls_to(run.clogged)[1], "biomass then"),
     Quantity("contact_time_h", "time of contact", "time_h of the first row with contact",
              lambda run: run.at_contact(run.times), "contact"),
     Quantity("contact_biomass", "biomass at contact", "aggregate_area_um2 / (W L) in that row",
@@ -76,11 +117,10 @@ NUMBERS = (
     Quantity("half_conductivity_time_h", "time of half conductivity",
              "when conductivity_m_per_d over its first value has first fallen to 0.5; its "
              "logarithm is linear between rows",
-             lambda run: clogging(run.times, run.relative, run.biomass, 0.5)[0],
-             "half conductivity"),
+             lambda run: run.falls_to(0.5)[0], "half conductivity"),
     Quantity("fold_time_h", "time of the fold",
              "time_h of the last row of a run that ends as a fold",
-             lambda run: run.times[-1] if run.folded else np.nan, "fold"),
+             lambda run: run.times[-1] if status.is_fold(run.status) else np.nan, "fold"),
 )
 COLUMNS = [number.name for number in NUMBERS]
 
@@ -95,38 +135,6 @@ def final_columns(points: Sequence[Point]) -> list[str]:
     """The columns of a row of a run whose last values are in ``runs.csv``; ``end_h`` is their time.
     """
     return [name for name in series_columns(points) if name != "time_h"]
-
-
-@dataclass(frozen=True, eq=False)
-class SweepRun:
-    """The results of one run of a sweep.
-
-    times (h); relative: conductivity over its first value; biomass: area of the aggregate over that
-    of the pore; all (T,), empty without a run. numbers: values of COLUMNS, None if undefined;
-    final: the last values of :func:`final_columns`, likewise.
-    """
-
-    point: Point
-    status: str
-    times: np.ndarray
-    relative: np.ndarray
-    biomass: np.ndarray
-    numbers: dict[str, float | None]
-    final: dict[str, float | None] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        values = ", ".join(str(value) for value in self.point.values)
-        end = self.numbers["end_h"]
-        return f"<run {self.point.index} ({values}): {self.status}{_to(end)}>"
-
-    @property
-    def is_over(self) -> bool:
-        """Is the run finished?"""
-        return status.is_over(self.status)
-
-
-def _to(end: float | None) -> str:
-    return "" if end is None else f", to {end:.4g} h"
 
 
 class Runs(list[SweepRun]):
@@ -147,36 +155,25 @@ def read_runs(sweep: Sweep, statuses: dict[int, str], clogged: float) -> Runs:
                 for point in sweep.points)
 
 
+def run_folders(folder: Path) -> list[Path]:
+    """The folders of the runs with rows of a sweep, by its ``runs.csv``; else the folder itself."""
+    file = folder / "runs.csv"
+    if not is_file(file):
+        return [folder]
+    with file.open(encoding="utf-8", newline="") as lines:
+        return [folder / row["folder"] for row in csv.DictReader(lines) if row["end_h"]]
+
+
 def _read_run(point: Point, folder: Path, missing_status: str, clogged: float) -> SweepRun:
     try:
         run = read_scene_run(folder, point.scene)
     except OutputError:
-        return _empty_run(point, missing_status)
-    if run.record["status"] == status.RUNNING:  # it was killed, and its table may be cut short
-        return _empty_run(point, missing_status)
-    series = run.series
-    pore = point.scene.pore
-    times = run.times
+        return SweepRun(point, missing_status, clogged)
     run_status = run.record["status"]
-    if not len(times):
-        return _empty_run(point, run_status)
-    relative = series["conductivity_m_per_d"] / series["conductivity_m_per_d"][0]
-    biomass = series["aggregate_area_um2"] / (pore.width * pore.length)
-    wall = run.record["wall_time_s"]
-    course = RunSeries(times, relative, biomass, series["contact"] > 0, wall, clogged,
-                       status.is_fold(run_status))
-    numbers = {number.name: _none_if_nan(number.reported(course)) for number in NUMBERS}
-    final = {name: _none_if_nan(values[-1]) for name, values in series.items()}
-    return SweepRun(point, run_status, times, relative, biomass, numbers, final)
-
-
-def _empty_run(point: Point, run_status: str) -> SweepRun:
-    none = np.zeros(0)
-    return SweepRun(point, run_status, none, none, none, dict.fromkeys(COLUMNS))
-
-
-def _none_if_nan(value: float) -> float | None:
-    return None if np.isnan(value) else float(value)
+    if run_status == status.RUNNING:  # it was killed, and its table may be cut short
+        return SweepRun(point, missing_status, clogged)
+    series = run.series if len(run.times) else {}
+    return SweepRun(point, run_status, clogged, series, run.record["wall_time_s"])
 
 
 def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
@@ -202,10 +199,10 @@ def write(sweep: Sweep, runs: list[SweepRun]) -> None:
     varied = [factor.column for factor in sweep.factors]
     with atomic_path(sweep.folder / "table.csv") as beside:
         results.write_table(beside, ["run", *varied, *series_columns(sweep.points)],
-                            list(_rows(sweep, runs)))
+                            _rows(sweep, runs))
     columns = run_columns(sweep.factors, runs)
     with atomic_path(sweep.folder / "runs.csv") as beside:
-        results.write_table(beside, list(columns), list(map(list, zip(*columns.values()))))
+        results.write_table(beside, list(columns), zip(*columns.values()))
 
 
 def run_columns(factors: Sequence[Factor], runs: Sequence[SweepRun]) -> dict[str, list]:

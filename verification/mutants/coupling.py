@@ -50,7 +50,7 @@ MUTANTS = (
         ("departure-unrecorded",
          "A folder does not say that an aggregate has left the pore.",
          "Recorder.warnings_so_far",
-         "(Caveat('growth.after_detachment', text) for text in self.history.departed)",
+         '(Caveat("growth.after_detachment", text) for text in history.departed)',
          "()",
          "tests/test_several_aggregates.py::test_a_folder_says_which_aggregates_left")),
     *changes(

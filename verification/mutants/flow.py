@@ -199,7 +199,7 @@ MUTANTS = (
         "repro/scene/rules.py",
         ("tightest-permeability-accepted",
          "A permeability whose flow is lost in round-off is accepted.",
-         "_biomass_rules",
+         "_flow_rules",
          "drive.permeability < 0.999 * least",
          "drive.permeability < 0.0 * least",
          "tests/test_scene_refusals.py::test_an_entry_that_conflicts_with_the_scene_is_refused")),
