@@ -92,10 +92,9 @@ def wedge(degrees, height=20.0, arcs=6):
 
 
 @pytest.mark.parametrize("degrees, clearance", [(16.6, np.tan(np.radians(16.6)) / np.tan(ANGLE) - 1), (16.7, 0.0),
-                                                (30.0, 1 - np.tan(ANGLE) / np.tan(np.radians(30.0)))])
+                                                (30.0, np.tan(np.radians(30.0)) / np.tan(ANGLE) - 1)])
 def test_clearance_of_a_straight_wedge_is_that_of_its_angle(degrees, clearance):
-    """Both upper contact lines have the same clearance. The surface leans over the fluid at the lower lines. If the
-    angle is large enough, the clearance is least where the rule begins, at a fifth of the film."""
+    """Both upper contact lines have the same clearance. The surface leans over the fluid at the lower lines."""
     values = clearances(wedge(degrees))
     assert values[TOP, 1] == pytest.approx(clearance, abs=1e-9)
     assert values[TOP, -1] == pytest.approx(clearance, abs=1e-9)
@@ -112,33 +111,18 @@ def test_clearance_sees_a_film_that_runs_along_the_wall(gap, clearance, mirror):
     upstream = -1 if mirror else 1
     values = clearances(mirrored(outline) if mirror else outline)
     assert values[TOP, upstream] == pytest.approx(clearance, abs=1e-9)
-    assert values[TOP, -upstream] > 0.5
+    assert values[TOP, -upstream] > 1
 
 
-@pytest.mark.parametrize("length, clearance", [(1.25, 0.06), (1.45, -0.708), (4.5, -0.708)])
+@pytest.mark.parametrize("length, clearance", [(1.25, None), (1.45, -0.708), (4.5, -0.708)])
 @pytest.mark.parametrize("mirror", [False, True])
 def test_clearance_ignores_the_angle_close_to_the_line(length, clearance, mirror):
-    """A wedge of 5 degrees beside the line ends in a step. A fifth of film / tan(angle) is 1.33 um. The clearance of
-    a shorter wedge is that of the step at a fifth of the film, 1 - 1.25 / 1.33."""
+    """A wedge of 5 degrees beside the line ends in a step. A fifth of film / tan(angle) is 1.33 um."""
     low = 20.0 - length * np.tan(np.radians(5.0))
     rim = [[-60.0, 0.0], [-5.0 - length - 0.01, 16.0], [-5.0 - length, low], [-5.0, 20.0], [5.0, 20.0], [30.0, 0.0]]
     outline = polygon(np.array(rim), channel_walls(20.0), 2)
-    assert clearances(mirrored(outline) if mirror else outline)[TOP, -1 if mirror else 1] == pytest.approx(
-        clearance, abs=2e-3)
-
-
-def overhanging(lean):
-    """A plug whose sides lean back under its upper contact surface by ``lean`` times their depth."""
-    side = np.linspace(0, 1, 7)[:, None]
-    left = [-30.0, 0.0] + np.hstack([lean * (1 - side), side]) * 20.0
-    return polygon(np.vstack([left, left[::-1] * [-1, 1]]), channel_walls(20.0), 2)
-
-
-@pytest.mark.parametrize("lean", [0.0, 0.3, 1.0])
-def test_clearance_behind_a_line_that_is_too_far_grows_with_the_overhang(lean):
-    """A line that is too far has a surface that leans back. Its clearance keeps a slope: it is the distance from the
-    line to the surface, at a fifth of the film, over a fifth of film / tan(angle), plus one."""
-    assert clearances(overhanging(lean))[TOP, 1] == pytest.approx(1 + lean * np.tan(ANGLE), abs=1e-9)
+    value = clearances(mirrored(outline) if mirror else outline)[TOP, -1 if mirror else 1]
+    assert value == pytest.approx(clearance, abs=1e-3) if clearance else value > 0.5
 
 
 def test_a_surface_through_the_wall_has_a_negative_clearance():
@@ -276,7 +260,6 @@ def test_newton_places_a_line_whose_clearance_jumps_at_a_corner(factor, plugged,
     (0.5, 0.51, False, 1.0202),
     (1.0202, -0.01, False, 1.0202),
     (1.0202, -0.01, True, 0.9798),
-    (1.0202, -0.3, False, 1.0202),
     (1.0202, -0.3, True, 0.7202),
     (0.9798, 0.01, False, 0.9798),
     (0.9798, 0.01, True, 1.0202),
@@ -355,28 +338,6 @@ def test_the_triangles_of_the_mesh_take_over_from_the_small_ones(plugged, monkey
     shape = with_line_size(scene, pore, 0.1, on_mesh.advances, 1.05)
     assert shape.bisection is None
     assert shape.advances == pytest.approx(on_mesh.advances, abs=0.02)
-
-
-def test_small_triangles_are_tried_again_from_the_equilibrium_on_the_mesh(plugged, monkeypatch):
-    """If Newton's method fails on small triangles, that equilibrium tells where the lines are, and is a better start.
-    A run whose line goes too far on the mesh once keeps it there, because contact does not end."""
-    scene, pore = plugged
-    coarse = expanded_by(scene, pore, 1.3)
-    predicted = contact._predicted
-    expected = with_line_size(scene, pore, 0.1, coarse.advances)
-    starts = []
-
-    def fail_first(mechanics, grown, theta, start, search):
-        starts.append(start)
-        if len(starts) == 1:
-            raise GrowthError("no equilibrium on small triangles")
-        return predicted(mechanics, grown, theta, start, search)
-
-    monkeypatch.setattr(contact, "_predicted", fail_first)
-    shape = with_line_size(scene, pore, 0.1, {key: 0.9 * advance for key, advance in coarse.advances.items()})
-    assert shape.bisection is not None
-    assert shape.advances == pytest.approx(expected.advances, abs=0.01)
-    assert np.abs(starts[1].mesh.points - coarse.position)[pore.mesh.body].max() < 1e-3
 
 
 @pytest.mark.thorough
@@ -505,8 +466,7 @@ def without_newton(monkeypatch):
     ("newton", "fast"), pytest.param("search", "fast", marks=pytest.mark.thorough),
     pytest.param("newton", "accurate", marks=pytest.mark.thorough)])
 def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(method, preset, monkeypatch):
-    """After every step no clearance is negative, and lines that have advanced have zero clearance. No
-    step of Newton's method comes close to turning a triangle over."""
+    """After every step no clearance is negative, and lines that have advanced have zero clearance."""
     if method == "search":
         without_newton(monkeypatch)
     scene = load_scene("wide", [f"numerics.preset={preset}", 'pore.width="25 um"', 'growth.end="18.5 h"',
@@ -514,23 +474,14 @@ def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(method, pr
     keys = scene.growth
     rule = Clearance(channel_walls(scene.pore.width), keys.minimum_film, keys.minimum_contact_angle)
     expansions = []
-    kept = []
 
     def record_expansion(*arguments):
         expansions.append(expand(*arguments))
         return expansions[-1]
 
-    def record_kept(coupled, iterate):
-        before = coupled.placed.least_expansion(coupled.position)
-        moving = step(coupled, iterate)
-        kept.append(coupled.placed.least_expansion(coupled.position) / min(before, 1.0))
-        return moving
-
     expand = contact.expand
-    step = contact_newton.Coupled._step
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact, "expand", record_expansion)
-        patch.setattr(contact_newton.Coupled, "_step", record_kept)
         for _ in simulate(scene):
             pass
     touching = [expansion for expansion in expansions if expansion.pore.contact]
@@ -542,7 +493,6 @@ def test_the_contact_surface_is_the_smallest_that_leaves_enough_fluid(method, pr
             if length > 1.0:
                 advanced += values[key[1:]] <= contact_lines.CLOSE
     assert advanced >= 5
-    assert method == "search" or len(kept) > 30 and min(kept) > contact_newton.KEPT
 
 
 @pytest.mark.parametrize("left, refused", [("11.9 um", True), ("11.5 um", False)])

@@ -20,9 +20,10 @@ ACROSS_PORE = 14.0
 ACROSS_AGGREGATE = 10.0
 ACROSS_FILM = 10.0
 #: Size beside the contact lines of a new mesh, over the size where a step ends. In ``fast`` lengths
-#: of contact err by 1.1, 0.2, 0.15 and 0.03 % with 4, by 0.45, 0.02, 0.08 and 0.04 % with 8, and by
-#: 2.4, 0.6, 0.8 and 0.5 % without smaller triangles (``growth-gold-contact``).
-PARTS_OF_CONTACT = 8.0
+#: of contact err by 1.0, 0.2, 0.15 and 0.02 % with 4, by 0.5, 0.02, 0.06 and 0.25 % with 8, and by
+#: 2.4, 0.6, 0.8 and 0.5 % without smaller triangles (``growth-gold-contact``). With 8 the time in
+#: contact doubles.
+PARTS_OF_CONTACT = 4.0
 #: Limit on the elements along the interface, at refinement 1, that follow from the thickness. A
 #: half-disc has 31; a body more than 60 times longer than thick reaches the limit. With 200 or 400
 #: slivers fail at their first new mesh, with 4000 a step takes minutes.

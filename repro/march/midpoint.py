@@ -126,17 +126,13 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
             search: SearchOptions) -> Expansion:
     """Equilibrium of the aggregate at a part of the step, starting from its known shapes.
 
-    Contact lines start at their interpolated places and have small triangles. In contact the end of
-    a step starts from the shape half way: nodes that the lines pass stay on the wall, so a shape is
-    not smooth in time there, and an extrapolated one would be distorted.
+    Contact lines start at their interpolated places and have small triangles there.
     """
     shapes = _known_shapes(half, part)
     advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
                 for key in half.expansion.advances}
     search = replace(search, advances=advances,
                      line_size=stages.remeshing.meshing.sizes.moving_lines)
-    if previous.spanning and half.end is None:
-        shapes = [(1.0, half.expansion)]
     return stages.expand(previous, after, _guess_shape(previous, shapes), search)
 
 

@@ -34,8 +34,8 @@ CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
 #: has placed the lines.
 PREDICTIONS = 3
 #: Largest distance of a line from its expected place, over the size of the triangles there. At that
-#: distance they are three times as large.
-MISSED = 2
+#: distance they are five times as large.
+MISSED = 4
 #: Growth of this size with the distance from a line. Bisection keeps the angles whatever it is.
 LINE_GRADATION = 1.0
 #: Contact lines stay in place after so many rounds of shape and fluid forces, because each search
@@ -87,33 +87,19 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     thickness counts under the forces of the open pore, because a closed pore has larger forces.
 
     If ``search.line_size`` is finite, triangles are bisected where ``search.advances`` expects the
-    contact lines with the opposite wall. If there is no equilibrium on them, the one on the mesh
-    tells where to bisect, and is the start. If this fails too, it is the result.
+    contact lines with the opposite wall. If there is no equilibrium on them, the result is the
+    equilibrium on the mesh.
     """
     start = guess or grown
-    shape = _on_small_triangles(mechanics, grown, theta, start, search)
-    if shape:
-        return shape
-    shape = _expand(mechanics, grown, theta, start, search)
-    start = replace(grown.moved(shape.position), pressure=shape.pore.pressure[: grown.mesh.corners])
-    search = replace(search, advances=shape.advances)
-    return _on_small_triangles(mechanics, grown, theta, start, search) or shape
+    if search.line_size < inf and len(_lines_after(grown, search.advances)):
+        with suppress(GrowthError):
+            return _on_small_triangles(mechanics, grown, theta, start, search)
+    return _expand(mechanics, grown, theta, start, search)
 
 
 def _on_small_triangles(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
-                        start: Pore, search: SearchOptions) -> Expansion | None:
-    """:func:`expand` on small triangles beside the contact lines with opposite walls; None if they
-    have no size or no lines, or if there is no equilibrium on them."""
-    if search.line_size == inf or not len(_lines_after(grown, search.advances)):
-        return None
-    with suppress(GrowthError):
-        return _predicted(mechanics, grown, theta, start, search)
-    return None
-
-
-def _predicted(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], start: Pore,
-               search: SearchOptions) -> Expansion:
-    """:func:`expand` on small triangles, made anew where the lines are not near."""
+                        start: Pore, search: SearchOptions) -> Expansion:
+    """:func:`expand` on small triangles beside the contact lines with opposite walls."""
     for _ in range(PREDICTIONS):
         lines = _lines_after(grown, search.advances)
         fine, fine_theta, bisection = _bisected(grown, theta, lines, search.line_size)

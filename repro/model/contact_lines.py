@@ -4,15 +4,13 @@ A contact line is the end of a contact surface. Its advance is the number of arc
 that have joined the wall beyond its previous position; a fraction divides an arc. The clearance
 beyond a line is the smallest value on the free surface of
 
-    (gap - need) / max(need, ANGLE_FROM film),    need = min(film, tan(angle) d)
+    gap / min(film, tan(angle) d) - 1
 
 at the distance d from the line along the wall. If it is negative, a film or a wedge is too thin.
-Where a surface leans back over the contact, d and need are negative: beyond a line that is too far
-the clearance keeps its slope, and Newton's method can bring the line back. Beside the line the
-surface opens like the root of d, and the angle of the first arc depends on the arc's length. The
-rule is therefore tested where the gap is ANGLE_FROM film or more, or d is ANGLE_FROM film /
-tan(angle) or more. A converged surface comes nearest to the wall there. Closer to the line
-PART_OF_ANGLE tan(angle) suffices, so that no arc passes the wall.
+Beside the line the surface opens like the root of d, and the angle of the first arc depends on the
+arc's length. The angle is therefore tested at distances of ANGLE_FROM film / tan(angle) or more. A
+converged surface comes nearest to the wall there. Closer to the line PART_OF_ANGLE tan(angle)
+suffices, so that no arc passes the wall.
 
 The contact surface is the smallest one without a negative clearance, so each line advances until
 its clearance vanishes. The secant method, safeguarded by bisection, searches for all lines at once.
@@ -30,24 +28,20 @@ import numpy as np
 
 from repro.errors import GrowthError
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, Wall, Walls, numbered
+from repro.fem.walls import FREE, Walls, numbered
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 #: With 2e-3 that was 0.01 um, up to 0.2 % of a short length of contact (``growth-gold-contact``).
 CLOSE = 5e-4
-#: Least gap, over the film, and least distance from a line, over film / tan(angle), at which the
-#: rule is tested. The converged surfaces of reference/gold come nearest to the wall at 0.31 to 1 of
-#: film / tan(angle).
+#: Least distance from a line at which the angle is tested, over film / tan(angle). The converged
+#: surfaces of reference/gold come nearest to the wall at 0.31 to 1 of film / tan(angle).
 ANGLE_FROM = 0.2
 #: Relative round-off of a distance.
 ROUND_OFF = 1e-9
 #: Tangent of the least angle closer to the line, over tan(angle). A converged surface is steeper.
 PART_OF_ANGLE = 0.1
-#: The clearance of points that are not tested.
+#: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
-#: Arcs that are farther from the wall than this times the film do not count: their clearance is 1
-#: or more.
-NEAR_WALL = 2.0
 #: If an advance that is too short and one that is far enough are closer than this (arcs), the
 #: clearance is taken to jump between them.
 SAME_PLACE = 5e-3
@@ -135,54 +129,49 @@ class Clearance:
         Returns
         -------
         clearance : float
-            Beyond a line that is too far, it grows with the distance from the line to the surface.
+            At most AMPLE; AMPLE if no free surface faces the wall.
         reach : float
             Arcs from the line to the farthest point with a negative clearance, zero if none.
         """
         arcs, last = _free_arcs(outline, node, direction)
         outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
+        place, points = self._places(arcs, outwards)
+        distance = outwards * (points[:, 0] - arcs[0, 0, 0])
         wall = numbered(self.walls, outline.wall[node])
-        nodes = self._scaled(arcs, arcs[0, 0], outwards, wall)
-        near = np.flatnonzero(nodes[1].min(axis=1) < NEAR_WALL)
-        place, distance, gap = _places(near, *(each[near] for each in nodes))
-        needs = np.minimum(distance, 1.0)
-        beside = np.maximum(gap, distance) < ANGLE_FROM * (1 - ROUND_OFF)
-        needs[beside] = PART_OF_ANGLE * np.maximum(needs[beside], 0.0)
-        ratio = (gap - needs) / np.maximum(needs, ANGLE_FROM)
-        ratio[(place == 0) | beside & (ratio >= 0)] = AMPLE
+        gap = wall.film(points)
+        needs = np.minimum(self.film, np.tan(self.angle) * distance)
+        tested_from = ANGLE_FROM * (1 - ROUND_OFF) * self.film / np.tan(self.angle)
+        needs[distance < tested_from] *= PART_OF_ANGLE
+        facing = place > 0
         if outline.wall[last] == wall.number:
             # Free surface between two lines of one wall belongs to the nearer line.
-            apart, _ = self._scaled(outline.points[last], arcs[0, 0], outwards, wall)
-            ratio[distance > np.abs(distance - apart)] = AMPLE
+            facing &= distance <= np.abs(points[:, 0] - outline.points[last, 0])
+        ratio = np.full(len(gap), AMPLE)
+        beside = facing & (needs > 0)
+        ratio[beside] = np.minimum(gap[beside] / needs[beside] - 1, AMPLE)
+        through = facing & (needs <= 0) & (gap < 0)
+        ratio[through] = gap[through] / self.film
         return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
 
-    def _scaled(self, points: np.ndarray, line: np.ndarray, outwards: float,
-                wall: Wall) -> tuple[np.ndarray, np.ndarray]:
-        """The distance of points (..., 2) um from a line over film / tan(angle), and their gap over
-        the film."""
-        distance = outwards * (points[..., 0] - line[0]) * np.tan(self.angle) / self.film
-        return distance, wall.film(points) / self.film
-
-
-def _places(numbers: np.ndarray, distances: np.ndarray,
-            gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(K,) arcs from the line, distance and gap of the points where the clearance is computed:
-    PLACES of each arc, those where the rule begins, and where it changes from the angle to the
-    film; numbers: (k,) of the arcs; distances, gaps: (k, 3) of their nodes."""
-    heights = np.concatenate([distances - ANGLE_FROM, distances - 1.0, gaps - ANGLE_FROM])
-    beyond = heights @ AT_PLACES.T
-    row, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
-    part = beyond[row, k] / (beyond[row, k] - beyond[row, k + 1])
-    t = PLACES[k] + part * np.diff(PLACES)[k]
-    first, second = arc_derivatives(heights[row])
-    for _ in range(3):  # Newton's method; the interpolated place is near
-        t = t - np.einsum("ka,ka->k", parabola(t), heights[row]) / (first + second * t)
-    arc = row % len(numbers)
-    arc, t = (np.concatenate(both) for both in (
-        (np.repeat(np.arange(len(numbers)), len(PLACES)), arc), (np.tile(PLACES, len(numbers)), t)))
-    weights = parabola(t)
-    return (numbers[arc] + t, np.einsum("ka,ka->k", weights, distances[arc]),
-            np.einsum("ka,ka->k", weights, gaps[arc]))
+    def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) arcs from the line, and (K, 2) um the points there: PLACES of each arc, and the
+        points where the rule begins, and where it changes from the angle to the film."""
+        points = AT_PLACES @ arcs
+        place = np.arange(len(arcs))[:, None] + PLACES
+        places, all_points = [place.ravel()], [points.reshape(-1, 2)]
+        nodes = outwards * (arcs[..., 0] - arcs[0, 0, 0]) * np.tan(self.angle) / self.film
+        for change in (ANGLE_FROM, 1.0):
+            beyond = nodes @ AT_PLACES.T - change
+            arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
+            part = beyond[arc, k] / (beyond[arc, k] - beyond[arc, k + 1])
+            t = PLACES[k] + part * np.diff(PLACES)[k]
+            first, second = arc_derivatives(nodes[arc])
+            for _ in range(3):  # Newton's method; the interpolated place is near
+                error = np.einsum("ka,ka->k", parabola(t), nodes[arc]) - change
+                t = t - error / (first + second * t)
+            places.append(arc + t)
+            all_points.append(np.einsum("ka,kai->ki", parabola(t), arcs[arc]))
+        return np.concatenate(places), np.vstack(all_points)
 
 
 def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray, int]:

@@ -171,8 +171,8 @@ MUTANTS = (
         ("half-angle",
          "Wedges beside a contact line close at half of the least slope.",
          "Clearance.beyond",
-         "needs = np.minimum(distance, 1.0)",
-         "needs = np.minimum(0.5 * distance, 1.0)")),
+         "np.minimum(self.film, np.tan(self.angle) * distance)",
+         "np.minimum(self.film, 0.5 * np.tan(self.angle) * distance)")),
     *changes(
         "repro/march/ends.py",
         ("fold-never",
