@@ -67,7 +67,7 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
     for _ in range(HALVINGS):
         outlines = [sizes_of.split(outline, beside)
                     for outline, beside in sizes_of.each_beside(outlines, sizing)]
-        outlines = welds.matched(outlines, sizing.film)
+        outlines = welds.matched(outlines, sizing)
         corners = [outline.corners for outline in outlines]
         for polygon in corners:
             check_outline(polygon, ends, sizing.walls)

@@ -15,8 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from repro.errors import MeshError
+from repro.fem import sizing as sizes_of
 from repro.fem.outline import Outline, parabola
-from repro.fem.sizing import placed
+from repro.fem.sizing import Sizing, placed
 from repro.fem.walls import FREE, WELD
 
 #: Corners of the two surfaces are opposite if their lengths from the line differ by at most this
@@ -117,10 +118,15 @@ def _shortest(lengths: np.ndarray) -> np.ndarray:
     return np.minimum(edges[:-1], edges[1:])
 
 
-def matched(outlines: Sequence[Outline], film: float) -> list[Outline]:
-    """The same curves with opposite corners beyond a weld; film: the least one, um."""
+def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The same curves with opposite corners beyond a weld, close to each other at its ends."""
     if len(outlines) != 2 or not all((outline.wall == WELD).any() for outline in outlines):
         return list(outlines)
+    return _refined(_with_opposite(outlines, sizing.film), sizing)
+
+
+def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
+    """The same curves with opposite corners beyond a weld; film: the least one, um."""
     cuts: tuple[list, list] = ([], [])
     for walks in notches(*outlines):
         lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
@@ -131,6 +137,35 @@ def matched(outlines: Sequence[Outline], film: float) -> list[Outline]:
             s = s[(s <= reach) & (s < lengths[number][-1])]
             cuts[number].extend(_places(outlines[number], walks[number], lengths[number], s))
     return [cut(outline, places) for outline, places in zip(outlines, cuts)]
+
+
+def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The same curves with both edges between opposite corners divided into equal parts.
+
+    The parts are as long as ``sizing.moving_lines`` over the least film from the line, and grow
+    from there.
+    """
+    cuts: tuple[list, list] = ([], [])
+    for walks in notches(*outlines):
+        lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
+        count = opposite_corners(*lengths)
+        longest = np.maximum(*(np.diff(each[:count]) for each in lengths))
+        beyond = np.maximum(lengths[0][: count - 1] - sizing.film, 0.0)
+        size = sizing.moving_lines + sizes_of.GRADATION * beyond
+        parts = np.maximum(1, np.ceil(longest / (sizes_of.SPLIT * size))).astype(int)
+        for outline, walk, each, cut_at in zip(outlines, walks, lengths, cuts):
+            s = np.concatenate([np.linspace(a, b, n + 1)[1:-1]
+                                for a, b, n in zip(each, each[1:], parts)])
+            cut_at.extend(_places(outline, walk, each, s))
+    return [cut(outline, places) for outline, places in zip(outlines, cuts)]
+
+
+def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
+    """Number of corners from the line on, the line included, that are opposite each other, from the
+    lengths (um) at which they lie on both surfaces."""
+    count = min(len(one), len(two))
+    pairs = np.diagonal(opposite(one, two))[:count]
+    return count if pairs.all() else int(np.argmin(pairs))
 
 
 def _reach(outlines: Sequence[Outline], walks: Sequence[np.ndarray],

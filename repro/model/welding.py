@@ -5,8 +5,8 @@ pressure of the nodes of the weld, and each triangle keeps the reference and the
 aggregate, so that both keep the strain that they had when they joined. A film between them closes
 as one at a wall does (2.3.3): it must be as thick as the least film, or as tan(angle) times the
 distance along its middle line from the line, whichever is less. Pairs of opposite nodes
-(:mod:`repro.fem.welds`) up to the farthest one that violates the rule join. They go half of the way
-each, and then to equilibrium. Contact lines on walls advance by nodes, too.
+(:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. They go half of the
+way each, and then to equilibrium. Contact lines on walls advance by nodes, too.
 """
 
 from __future__ import annotations
@@ -82,12 +82,16 @@ class Welding:
         lengths = [[welds.lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
                    for walks in self._walks]
         #: Corners of each notch that are opposite each other, and their lengths from the line.
-        self._lengths = [each[0][: _opposite_corners(*each)] for each in lengths]
+        self._lengths = [each[0][: welds.opposite_corners(*each)] for each in lengths]
         loops = mesh.topology.loops
         self._pairs = [np.column_stack([loop[walk[: mesh.geometry * (len(own) - 1) + 1]]
                                         for loop, walk in zip(loops, walks)])
                        for walks, own in zip(self._walks, self._lengths)]
         self._iterations = 0
+
+    def equilibrium(self) -> Pore:
+        """The equilibrium with the weld and the contact of the start."""
+        return self._equilibrium(self.start, [0, 0], [0, 0])
 
     def close(self, reach: float = 0.0) -> Expansion:
         """The shape in which no film between the aggregates and no wedge at a wall is too thin.
@@ -105,7 +109,7 @@ class Welding:
                 shape = self._equilibrium(shape, before, joined)
             shape = self._equilibrium(shape, joined, joined)
             before = joined
-            joined = [max(count, size * self._violated(shape, number, film, np.tan(angle)))
+            joined = [count + size * self._violates(shape, number, film, np.tan(angle))
                       for number, count in enumerate(joined)]
             walls = [self._closing(shape, number, film, angle) for number in range(2)]
             touched = [np.where(wall != FREE, wall, body.wall)
@@ -174,8 +178,8 @@ class Welding:
         pressure[body_corners] = rest.pressure[number[body_corners]]
         return replace(shape.moved(points), pressure=pressure)
 
-    def _violated(self, shape: Pore, number: int, film: float, slope: float) -> int:
-        """The farthest corner of a notch that violates the rule, from the line; zero if none."""
+    def _violates(self, shape: Pore, number: int, film: float, slope: float) -> bool:
+        """Does a corner of a notch violate the rule?"""
         geometry = shape.mesh.geometry
         one, two = np.swapaxes(shape.mesh.points[self._pairs[number][::geometry]], 0, 1)
         before = self.grown.mesh.points[self._pairs[number][::geometry]]
@@ -194,11 +198,9 @@ class Welding:
         needs = np.minimum(film, slope * along)
         needs[along < ANGLE_FROM * (1 - ROUND_OFF) * film / slope] *= PART_OF_ANGLE
         bad = np.flatnonzero((gap < needs) & ~joined & (along > 0))
-        if not len(bad):
-            return 0
-        if bad[-1] == len(gap) - 1:
+        if len(bad) and bad[-1] == len(gap) - 1:
             raise GrowthError("the weld advances beyond the nodes that are opposite each other")
-        return int(bad[-1])
+        return len(bad) > 0
 
     def _closing(self, shape: Pore, number: int, film: float, angle: float) -> np.ndarray:
         """(M,) wall that each node of an aggregate must join next, or FREE; whole arcs join."""
@@ -221,10 +223,3 @@ class Welding:
         for number in range(2):
             marked = with_new_surfaces(marked.focused(number))
         return marked.focused(None)
-
-
-def _opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
-    """Number of corners from the line on, the line included, that are opposite each other."""
-    count = min(len(one), len(two))
-    pairs = np.diagonal(welds.opposite(one, two))[:count]
-    return count if pairs.all() else int(np.argmin(pairs))

@@ -344,6 +344,8 @@ def _growth_rules(scene: "Scene") -> Rules:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
         yield from _strength_rules(scene.growth)
         yield from _detachment_rules(scene.growth)
+        if scene.growth.welds:
+            yield from _weld_rules(scene, scene.growth)
         yield from _energy_rules(scene.growth)
         if scene.growth.erosion:
             yield from _erosion_rules(scene, scene.growth, scene.growth.erosion)
@@ -406,6 +408,26 @@ def _detachment_rules(growth: "Growth") -> Rules:
         "growth.after_detachment": "growth.bonding_strength or [growth.erosion] is needed with "
                                    "\"continue\"",
         "growth.bonding_strength": 'needed with growth.after_detachment = "continue"'}
+
+
+def _weld_rules(scene: "Scene", growth: "Growth") -> Rules:
+    """Rules of the weld, which joins two aggregates on opposite walls."""
+    weld = 'growth.meeting = "weld"'
+    opposite = [seed.wall for seed in scene.aggregates] in (["lower", "upper"], ["upper", "lower"])
+    yield not opposite, {
+        "growth.meeting": '"end" is needed unless there are two aggregates on opposite walls; more '
+                          "of them, or two on one wall, would enclose water"}
+    scheme = scene.numerics.scheme
+    yield not (scheme.controls_error and scheme.follows_layers), {
+        "growth.meeting": '"end" is needed without the curved elements and the midpoint rule of '
+                          'numerics.preset = "fast"',
+        "numerics.preset": f'"fast", "accurate" or "exact" is needed with {weld}'}
+    yield growth.has_fluid_forces, {
+        "growth.meeting": '"end" is needed with growth.fluid_forces = "included"',
+        "growth.fluid_forces": f'"neglected" is needed with {weld}'}
+    yield growth.erosion is not None, {
+        "growth.meeting": '"end" is needed with [growth.erosion]',
+        "growth.erosion": 'growth.meeting = "end" is needed with it'}
 
 
 #: The key that each law of erosion needs.
