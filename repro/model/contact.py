@@ -227,7 +227,7 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
     shape = Expansion(replace(grown, bodies=tuple(bodies)), 0)
     if grown.welded:
         from repro.model.welding import Welding  # a run without a weld does not load it
-        return Welding(mechanics, shape.pore, start, forces, search.patient).close()
+        return Welding(mechanics, shape.pore, start, forces, patient=search.patient).close()
     for number, region in enumerate(mesh.regions):
         own = None if forces is None else mesh.of_region(region, forces)
         closing = CLOSINGS[mesh.geometry](mechanics, shape.pore.focused(number),

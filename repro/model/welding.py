@@ -12,18 +12,19 @@ way each, and then to equilibrium. Contact lines on walls advance by nodes, too.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
-from repro.errors import GrowthError
+from repro.errors import GrowthError, LinearError
 from repro.fem import welds
 from repro.fem.forms import Basis, basis
 from repro.fem.walls import FREE, WELD
 from repro.model import growth, remeshing
 from repro.model.closing_by_nodes import closing_nodes
-from repro.model.contact_lines import ANGLE_FROM, PART_OF_ANGLE, ROUND_OFF
 from repro.model.mechanics import (
     CONTACT_ROUNDS,
     Expansion,
@@ -56,8 +57,70 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float) -> Po
     film = mechanics.keys.minimum_film
     outlines = welds.facing(*pore.outlines, film)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
-    shape = Welding(mechanics, facing, facing).close(film)
+    shape = Welding(mechanics, facing, facing, reach=film).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
+
+
+@dataclass(eq=False)
+class Notch:
+    """The water at one end of a weld.
+
+    pairs: (k, 2) nodes of the mesh that are opposite each other, from the line on; before:
+    (k, 2, 2) um, their places in the old shape; size: nodes from corner to corner; film, slope: the
+    least film (um) and the tangent of the least angle; joined: number of corners beyond the old
+    line that have joined; few, enough: largest number with which a film is too thin, and smallest
+    one with which none is; step: corners by which the next trial goes farther.
+    """
+
+    pairs: np.ndarray
+    before: np.ndarray
+    size: int
+    film: float
+    slope: float
+    joined: int = 0
+    enough: float = inf
+    step: int = 1
+
+    def __post_init__(self) -> None:
+        self.few = self.joined - 1
+
+    @property
+    def tied(self) -> np.ndarray:
+        """(k, 2) pairs that have joined."""
+        return self.pairs[: self.size * self.joined + 1]
+
+    def advance(self, points: np.ndarray) -> None:
+        """Go to the next trial, with the nodes at places (N, 2) um: the search doubles its steps
+        until no film is too thin, and then halves the interval."""
+        if not self._too_thin(points):
+            self.enough = self.joined
+        else:
+            self.few = self.joined
+            if self.enough <= self.joined:  # the other notch has moved since
+                self.enough, self.step = inf, 1
+        if self.enough < inf:
+            self.joined = int(self.few + self.enough + 1) // 2
+            return
+        last = (len(self.pairs) - 1) // self.size - 1
+        if self.few >= last:
+            raise GrowthError("the weld advances beyond the nodes that are opposite each other")
+        self.joined = min(self.few + self.step, last)
+        self.step *= 2
+
+    def _too_thin(self, points: np.ndarray) -> bool:
+        """Is a film at a node thinner than the rule asks for?"""
+        first = self.size * self.joined
+        one, two = np.swapaxes(points[self.pairs[first:]], 0, 1)
+        before = self.before[first:]
+        pieces = np.linalg.norm(np.diff(0.5 * (one + two), axis=0), axis=1)
+        along = np.cumsum(pieces)
+        tangent = np.gradient(before.mean(axis=1), axis=0)
+        normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        across = np.einsum("ki,ki->k", normal, before[:, 1] - before[:, 0])
+        normal *= np.sign(across[np.argmax(np.abs(across))])
+        gap = np.einsum("ki,ki->k", normal, two - one)[1:]
+        return bool((gap < np.minimum(self.film, self.slope * along)).any())
 
 
 @dataclass(eq=False)
@@ -66,72 +129,87 @@ class Welding:
 
     grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
     shape and pressure from which the search starts; forces: (n, 2) um on the nodes of all
-    aggregates, over mu_L.
+    aggregates, over mu_L; reach: um, length on both sides of the point of the first contact that
+    joins, zero with a weld; patient: as in :class:`SearchOptions`.
     """
 
     mechanics: Mechanics
     grown: Pore
     start: Pore
     forces: np.ndarray | None = None
+    reach: float = 0.0
     patient: bool = True
 
     def __post_init__(self) -> None:
-        mesh = self.grown.mesh
-        outlines = self.grown.outlines
-        self._walks = welds.notches(*outlines)
-        lengths = [[welds.lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
-                   for walks in self._walks]
-        #: Corners of each notch that are opposite each other, and their lengths from the line.
-        self._lengths = [each[0][: welds.opposite_corners(*each)] for each in lengths]
-        loops = mesh.topology.loops
-        self._pairs = [np.column_stack([loop[walk[: mesh.geometry * (len(own) - 1) + 1]]
-                                        for loop, walk in zip(loops, walks)])
-                       for walks, own in zip(self._walks, self._lengths)]
         self._iterations = 0
+        self._notches = [self._notch(walks) for walks in welds.notches(*self.grown.outlines)]
+
+    def _notch(self, walks: Sequence[np.ndarray]) -> Notch:
+        """The notch whose nodes on both outlines are ``walks``."""
+        mesh = self.grown.mesh
+        keys = self.mechanics.keys
+        size = mesh.geometry
+        lengths = [welds.lengths_from(*each) for each in zip(self.grown.outlines, walks)]
+        nodes = size * (welds.opposite_corners(*lengths) - 1) + 1
+        pairs = np.column_stack([loop[walk[:nodes]]
+                                 for loop, walk in zip(mesh.topology.loops, walks)])
+        return Notch(pairs, mesh.points[pairs], size, keys.minimum_film,
+                     np.tan(keys.minimum_contact_angle),
+                     int(np.abs(lengths[0] - self.reach).argmin()))
 
     def equilibrium(self) -> Pore:
         """The equilibrium with the weld and the contact of the start."""
-        return self._equilibrium(self.start, [0, 0], [0, 0])
+        return self._equilibrium(self.start, self._tied())
 
-    def close(self, reach: float = 0.0) -> Expansion:
+    def close(self) -> Expansion:
         """The shape in which no film between the aggregates and no wedge at a wall is too thin.
 
-        reach: length (um) from the point of the first contact that joins. Raises GrowthError.
+        Raises GrowthError.
         """
-        film = self.mechanics.keys.minimum_film
-        angle = self.mechanics.keys.minimum_contact_angle
-        size = self.grown.mesh.geometry
-        joined = [size * int(np.abs(own - reach).argmin()) for own in self._lengths]
         shape = replace(self.grown, space=self.start.space, pressure=self.start.pressure)
-        before = [0, 0] if not reach else [-1, -1]
+        tied = np.empty((0, 2), int) if self.reach else self._tied()
         for _ in range(CONTACT_ROUNDS):
-            if joined != before:
-                shape = self._equilibrium(shape, before, joined)
-            shape = self._equilibrium(shape, joined, joined)
-            before = joined
-            joined = [count + size * self._violates(shape, number, film, np.tan(angle))
-                      for number, count in enumerate(joined)]
-            walls = [self._closing(shape, number, film, angle) for number in range(2)]
-            touched = [np.where(wall != FREE, wall, body.wall)
-                       for wall, body in zip(walls, shape.bodies)]
-            if joined == before and not any((wall != FREE).any() for wall in walls):
-                return Expansion(self._marked(shape, joined), self._iterations)
+            shape = self._joined(shape, tied)
+            tied = self._tied()
+            marked = self._marked(shape)
+            for notch in self._notches:
+                notch.advance(shape.mesh.points)
+            walls = [self._closing(shape, number) for number in range(2)]
+            at_rest = np.array_equal(self._tied(), tied)
+            if at_rest and not any((wall != FREE).any() for wall in walls):
+                return Expansion(marked, self._iterations)
             shape = replace(shape, bodies=tuple(
-                replace(body, wall=wall) for body, wall in zip(shape.bodies, touched)))
+                replace(body, wall=np.where(wall != FREE, wall, body.wall))
+                for wall, body in zip(walls, shape.bodies)))
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
 
-    def _joined_pairs(self, counts: Sequence[int]) -> np.ndarray:
-        """(k, 2) nodes of the pairs that have joined, by their counts in both notches."""
-        return np.concatenate([pairs[: count + 1] for pairs, count in zip(self._pairs, counts)])
+    def _tied(self) -> np.ndarray:
+        """(k, 2) nodes of the pairs that have joined."""
+        return np.concatenate([notch.tied for notch in self._notches])
 
-    def _equilibrium(self, shape: Pore, tied: Sequence[int], joined: Sequence[int]) -> Pore:
-        """The equilibrium with pairs that are tied, and others that are placed half way between
+    def _joined(self, shape: Pore, tied: np.ndarray) -> Pore:
+        """The equilibrium after further pairs have joined half way between their nodes.
+
+        tied: (k, 2) pairs that have joined before. If the triangles beside the others are too
+        small for this, their aggregates first take the equilibrium with them at these places.
+        """
+        pairs = self._tied()
+        if not np.isin(pairs[:, 1], tied[:, 1]).all():
+            points = shape.mesh.points.copy()
+            points[pairs] = points[pairs].mean(axis=1)[:, None]
+            with suppress(GrowthError, LinearError):
+                return self._equilibrium(shape.moved(points), pairs)
+            shape = self._equilibrium(shape, tied[np.isin(tied[:, 1], pairs[:, 1])], pairs)
+        return self._equilibrium(shape, pairs)
+
+    def _equilibrium(self, shape: Pore, tied: np.ndarray,
+                     placed: np.ndarray | None = None) -> Pore:
+        """The equilibrium with pairs (k, 2) that are tied, and others, ``placed``, half way between
         their nodes."""
         grown = self.grown
         mesh = grown.mesh
         alias = np.arange(len(mesh.points))
-        pairs = self._joined_pairs(tied)
-        alias[pairs[:, 1]] = pairs[:, 0]
+        alias[tied[:, 1]] = tied[:, 0]
         cells = alias[mesh.cells[mesh.biomass]]
         nodes, own_cells = np.unique(cells, return_inverse=True)
         number = np.searchsorted(nodes, alias)
@@ -154,10 +232,9 @@ class Welding:
                 load = np.zeros(len(nodes))
                 np.add.at(load, number[region.nodes], support.load)
                 supports.append(Support(int(number[region.nodes[support.point]]), load))
-        placed = self._joined_pairs(joined)
-        apart = placed[alias[placed[:, 1]] != alias[placed[:, 0]]]
-        prescribed[apart] = True
-        target[apart] = shape.mesh.points[apart].mean(axis=1)[:, None]
+        if placed is not None:
+            prescribed[placed] = True
+            target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
         solid = WeldedSolid(
             Shape(own_cells.reshape(cells.shape), corners, grown.space.gradient_degree,
                   mesh.topology.method), reference[nodes], energy=grown.bodies[0].solid.energy,
@@ -178,44 +255,21 @@ class Welding:
         pressure[body_corners] = rest.pressure[number[body_corners]]
         return replace(shape.moved(points), pressure=pressure)
 
-    def _violates(self, shape: Pore, number: int, film: float, slope: float) -> bool:
-        """Does a corner of a notch violate the rule?"""
-        geometry = shape.mesh.geometry
-        one, two = np.swapaxes(shape.mesh.points[self._pairs[number][::geometry]], 0, 1)
-        before = self.grown.mesh.points[self._pairs[number][::geometry]]
-        middle = 0.5 * (one + two)
-        pieces = np.linalg.norm(np.diff(middle, axis=0), axis=1)
-        joined = np.linalg.norm(one - two, axis=1) == 0
-        first = int(np.flatnonzero(joined)[-1])
-        along = np.concatenate([[0.0], np.cumsum(pieces)])
-        along = along - along[first]
-        tangent = np.gradient(before.mean(axis=1), axis=0)
-        normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        across = np.einsum("ki,ki->k", normal, before[:, 1] - before[:, 0])
-        side = np.sign(across[np.argmax(np.abs(across))])
-        gap = side * np.einsum("ki,ki->k", normal, two - one)
-        needs = np.minimum(film, slope * along)
-        needs[along < ANGLE_FROM * (1 - ROUND_OFF) * film / slope] *= PART_OF_ANGLE
-        bad = np.flatnonzero((gap < needs) & ~joined & (along > 0))
-        if len(bad) and bad[-1] == len(gap) - 1:
-            raise GrowthError("the weld advances beyond the nodes that are opposite each other")
-        return len(bad) > 0
-
-    def _closing(self, shape: Pore, number: int, film: float, angle: float) -> np.ndarray:
+    def _closing(self, shape: Pore, number: int) -> np.ndarray:
         """(M,) wall that each node of an aggregate must join next, or FREE; whole arcs join."""
         seen = shape.focused(number)
         outline = seen.boundary
-        wall = closing_nodes(outline, seen.walls, film, angle)
+        keys = self.mechanics.keys
+        wall = closing_nodes(outline, seen.walls, keys.minimum_film, keys.minimum_contact_angle)
         if outline.geometry == 2:
             middles = wall[1::2]
             before = np.where(middles != FREE, middles, wall[::2])
             wall[::2] = np.where(before != FREE, before, np.roll(middles, 1))
         return wall
 
-    def _marked(self, shape: Pore, joined: Sequence[int]) -> Pore:
+    def _marked(self, shape: Pore) -> Pore:
         """The pore with the nodes that have joined marked as welded."""
-        pairs = self._joined_pairs(joined)
+        pairs = self._tied()
         bodies = [replace(body, wall=np.where(np.isin(loop, pairs[:, number]), WELD, body.wall))
                   for number, (body, loop) in enumerate(zip(shape.bodies,
                                                             shape.mesh.topology.loops))]
