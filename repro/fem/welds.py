@@ -80,19 +80,12 @@ def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarra
     are free; the line comes first."""
     start, end = ends_of(first)
     begin, last = ends_of(second)
-    return [_both_free(first, end, 1, second, begin, -1),
-            _both_free(first, start, -1, second, last, 1)]
-
-
-def _both_free(first: Outline, node: int, direction: int, second: Outline, other: int,
-               back: int) -> tuple[np.ndarray, np.ndarray]:
-    one = _free_from(first, node, direction)
-    two = _free_from(second, other, back)
-    return one, two
+    return [(_free_from(first, end, 1), _free_from(second, begin, -1)),
+            (_free_from(first, start, -1), _free_from(second, last, 1))]
 
 
 def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
-    """Nodes from one on, in a direction along the loop, as far as they are free; corner last."""
+    """Nodes from one on, in a direction along the loop, as far as they are free, to a corner."""
     count = len(outline.points)
     walk = (node + direction * np.arange(count)) % count
     free = 1 + int(np.flatnonzero(outline.wall[walk[1:]] != FREE)[0])
@@ -152,7 +145,7 @@ def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
         longest = np.maximum(*(np.diff(each[:count]) for each in lengths))
         beyond = np.maximum(lengths[0][: count - 1] - sizing.film, 0.0)
         size = sizing.moving_lines + sizes_of.GRADATION * beyond
-        parts = np.maximum(1, np.ceil(longest / (sizes_of.SPLIT * size))).astype(int)
+        parts = np.maximum(1, np.ceil(longest / size)).astype(int)
         for outline, walk, each, cut_at in zip(outlines, walks, lengths, cuts):
             s = np.concatenate([np.linspace(a, b, n + 1)[1:-1]
                                 for a, b, n in zip(each, each[1:], parts)])

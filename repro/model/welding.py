@@ -25,6 +25,7 @@ from repro.fem.forms import Basis, basis
 from repro.fem.walls import FREE, WELD
 from repro.model import growth, remeshing
 from repro.model.closing_by_nodes import closing_nodes
+from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF
 from repro.model.mechanics import (
     CONTACT_ROUNDS,
     Expansion,
@@ -108,19 +109,29 @@ class Notch:
         self.step *= 2
 
     def _too_thin(self, points: np.ndarray) -> bool:
-        """Is a film at a node thinner than the rule asks for?"""
-        first = self.size * self.joined
-        one, two = np.swapaxes(points[self.pairs[first:]], 0, 1)
-        before = self.before[first:]
-        pieces = np.linalg.norm(np.diff(0.5 * (one + two), axis=0), axis=1)
-        along = np.cumsum(pieces)
-        tangent = np.gradient(before.mean(axis=1), axis=0)
+        """Is a film thinner than the rule asks for? Close to the line less is asked for, as in
+        :mod:`repro.model.contact_lines`."""
+        free = self.pairs[self.size * self.joined:]
+        one, two = _along_arcs(points[free])
+        before = _along_arcs(self.before[self.size * self.joined:])
+        along = np.cumsum(np.linalg.norm(np.diff(0.5 * (one + two), axis=0), axis=1))
+        tangent = np.gradient(before.mean(axis=0), axis=0)
         normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        across = np.einsum("ki,ki->k", normal, before[:, 1] - before[:, 0])
+        across = np.einsum("ki,ki->k", normal, before[1] - before[0])
         normal *= np.sign(across[np.argmax(np.abs(across))])
         gap = np.einsum("ki,ki->k", normal, two - one)[1:]
-        return bool((gap < np.minimum(self.film, self.slope * along)).any())
+        needs = np.minimum(self.film, self.slope * along)
+        needs[along < ANGLE_FROM * (1 - ROUND_OFF) * self.film / self.slope] *= PART_OF_ANGLE
+        return bool((gap < needs).any())
+
+
+def _along_arcs(nodes: np.ndarray) -> np.ndarray:
+    """(2, p, 2) um, points along the arcs of both surfaces, from their nodes (k, 2, 2); the first
+    node, then PLACES of each arc."""
+    arcs = np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1)
+    points = np.einsum("ta,kasi->skti", AT_PLACES[1:], arcs).reshape(2, -1, 2)
+    return np.concatenate([nodes[None, 0].swapaxes(0, 1), points], axis=1)
 
 
 @dataclass(eq=False)
