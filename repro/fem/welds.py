@@ -16,13 +16,16 @@ import numpy as np
 
 from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
-from repro.fem.outline import Outline, parabola
+from repro.fem.outline import ON_ARC, Outline, parabola
 from repro.fem.sizing import Sizing, placed
 from repro.fem.walls import FREE, WELD
 
 #: Corners of the two surfaces are opposite if their lengths from the line differ by at most this
 #: part of the shortest edge beside them. Below a half, no corner has two opposite ones.
 OPPOSITE = 0.3
+#: Corners that a new mesh has made opposite count as such up to this part, because their lengths
+#: change with growth.
+STILL_OPPOSITE = 0.6
 #: The surfaces have opposite corners where the film between them is thinner than this, over the
 #: least film.
 MATCHED_FILMS = 3.0
@@ -46,7 +49,7 @@ def united(outlines: Sequence[Outline],
     """The outlines with one in place of two that are welded: that around both. own: as
     :func:`shared_points` gives it. Raises MeshError if two aggregates share more than one chain of
     nodes."""
-    if len(outlines) != 2 or not np.isin(*own).any():
+    if len(outlines) != 2 or not np.isin(own[0], own[1]).any():
         return list(outlines), list(own)
     first, second = outlines
     weld = np.isin(own[0], own[1])
@@ -93,16 +96,27 @@ def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
 
 
 def lengths_from(outline: Outline, walk: np.ndarray) -> np.ndarray:
-    """(c,) um along the chords from the first of the nodes ``walk`` to each of its corners."""
-    corners = outline.points[walk[:: outline.geometry]]
-    chords = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(chords)])
+    """(c,) um along the surface from the first of the nodes ``walk`` to each of its corners."""
+    return _lengths(outline, walk)[::ON_ARC]
 
 
-def opposite(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(c, d) True where a corner at a length (c,) um from the line is opposite one at (d,) um."""
+def _lengths(outline: Outline, walk: np.ndarray) -> np.ndarray:
+    """(p,) um along the surface from the first of the nodes ``walk`` to points on its arcs: to
+    ON_ARC of each, the last of them its end."""
+    nodes = outline.points[walk]
+    arcs = np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1)
+    points = np.einsum("ta,kai->kti", parabola(np.linspace(0, 1, ON_ARC + 1)), arcs)
+    pieces = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    return np.concatenate([[0.0], np.cumsum(pieces)])
+
+
+def opposite(one: np.ndarray, other: np.ndarray, part: float = OPPOSITE) -> np.ndarray:
+    """(c, d) True where a corner at a length (c,) um from the line is opposite one at (d,) um.
+
+    part: like OPPOSITE.
+    """
     apart = np.abs(one[:, None] - other)
-    return apart <= OPPOSITE * np.minimum(_shortest(one)[:, None], _shortest(other))
+    return apart <= part * np.minimum(_shortest(one)[:, None], _shortest(other))
 
 
 def _shortest(lengths: np.ndarray) -> np.ndarray:
@@ -115,7 +129,7 @@ def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """The same curves with opposite corners beyond a weld, close to each other at its ends."""
     if len(outlines) != 2 or not all((outline.wall == WELD).any() for outline in outlines):
         return list(outlines)
-    return _refined(_with_opposite(outlines, sizing.film), sizing)
+    return _with_opposite(_refined(outlines, sizing), sizing.film)
 
 
 def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
@@ -124,32 +138,29 @@ def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
     for walks in notches(*outlines):
         lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
         reach = _reach(outlines, walks, lengths, MATCHED_FILMS * film)
-        pairs = opposite(*lengths)
+        pairs = opposite(lengths[0], lengths[1])
         for number, missing in enumerate([~pairs.any(axis=0), ~pairs.any(axis=1)]):
             s = lengths[1 - number][missing]
             s = s[(s <= reach) & (s < lengths[number][-1])]
-            cuts[number].extend(_places(outlines[number], walks[number], lengths[number], s))
+            cuts[number].extend(_places(outlines[number], walks[number], s))
     return [cut(outline, places) for outline, places in zip(outlines, cuts)]
 
 
 def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
-    """The same curves with both edges between opposite corners divided into equal parts.
+    """The same curves with the edges beyond a weld divided into equal parts.
 
-    The parts are as long as ``sizing.moving_lines`` over the least film from the line, and grow
-    from there.
+    The parts are at most as long as ``sizing.moving_lines`` over the least film from the line, and
+    grow from there.
     """
     cuts: tuple[list, list] = ([], [])
     for walks in notches(*outlines):
-        lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
-        count = opposite_corners(*lengths)
-        longest = np.maximum(*(np.diff(each[:count]) for each in lengths))
-        beyond = np.maximum(lengths[0][: count - 1] - sizing.film, 0.0)
-        size = sizing.moving_lines + sizes_of.GRADATION * beyond
-        parts = np.maximum(1, np.ceil(longest / size)).astype(int)
-        for outline, walk, each, cut_at in zip(outlines, walks, lengths, cuts):
-            s = np.concatenate([np.linspace(a, b, n + 1)[1:-1]
-                                for a, b, n in zip(each, each[1:], parts)])
-            cut_at.extend(_places(outline, walk, each, s))
+        for outline, walk, cut_at in zip(outlines, walks, cuts):
+            lengths = lengths_from(outline, walk)
+            beyond = np.maximum(lengths[:-1] - sizing.film, 0.0)
+            size = sizing.moving_lines + sizes_of.GRADATION * beyond
+            parts = np.maximum(1, np.ceil(np.diff(lengths) / size)).astype(int)
+            for start, end, count in zip(lengths, lengths[1:], parts):
+                cut_at.extend(_places(outline, walk, np.linspace(start, end, count + 1)[1:-1]))
     return [cut(outline, places) for outline, places in zip(outlines, cuts)]
 
 
@@ -157,7 +168,7 @@ def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
     """Number of corners from the line on, the line included, that are opposite each other, from the
     lengths (um) at which they lie on both surfaces."""
     count = min(len(one), len(two))
-    pairs = np.diagonal(opposite(one, two))[:count]
+    pairs = np.diagonal(opposite(one, two, STILL_OPPOSITE))[:count]
     return count if pairs.all() else int(np.argmin(pairs))
 
 
@@ -172,16 +183,16 @@ def _reach(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
     return float(lengths[0][np.argmax(wide)] if wide.any() else lengths[0][-1])
 
 
-def _places(outline: Outline, walk: np.ndarray, lengths: np.ndarray,
-            s: np.ndarray) -> list[tuple[int, float]]:
-    """(edge, t) of the points at lengths s (um) from the first of the nodes ``walk``."""
-    corners = walk[:: outline.geometry] // outline.geometry
-    k = np.searchsorted(lengths, s, side="right") - 1
-    t = (s - lengths[k]) / (lengths[k + 1] - lengths[k])
-    edges = len(outline.points) // outline.geometry
-    forward = (corners[1] - corners[0]) % edges == 1
-    return [(int(corners[each]), float(part)) if forward
-            else (int(corners[each] - 1) % edges, float(1 - part)) for each, part in zip(k, t)]
+def _places(outline: Outline, walk: np.ndarray, s: np.ndarray) -> list[tuple[int, float]]:
+    """(arc, t) of the points at lengths s (um) from the first of the nodes ``walk``."""
+    lengths = _lengths(outline, walk)
+    corners = walk[::2] // 2
+    arcs = len(outline.points) // 2
+    forward = (corners[1] - corners[0]) % arcs == 1
+    places = np.interp(s, lengths, np.arange(len(lengths)) / ON_ARC)
+    t, k = np.modf(places)
+    return [(int(corners[each]), part) if forward else (int(corners[each] - 1) % arcs, 1 - part)
+            for each, part in zip(k.astype(int), t.tolist())]
 
 
 def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
@@ -195,8 +206,8 @@ def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
     parts = [np.array(each) for each in at]
     if outline.geometry == 2:
         parts = [np.column_stack([t, (t + np.append(t[1:], 1.0)) / 2]).ravel() for t in parts]
-    edge = np.repeat(np.arange(edges), [len(t) for t in parts])
-    return placed(outline, edge, np.concatenate(parts))
+    every = np.repeat(np.arange(edges), [len(t) for t in parts])
+    return placed(outline, every, np.concatenate(parts))
 
 
 def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
@@ -213,8 +224,8 @@ def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
         wall[node] = WELD
         outline = replace(outline, wall=wall)
         sides = [_free_from(outline, node, direction) for direction in (1, -1)]
-        outlines.append(cut(outline, [place for walk in sides for place in _places(
-            outline, walk, lengths_from(outline, walk), np.array([reach]))]))
+        outlines.append(cut(outline, [place for walk in sides
+                                      for place in _places(outline, walk, np.array([reach]))]))
     return outlines
 
 

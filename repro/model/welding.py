@@ -56,7 +56,8 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float) -> Po
     """The pore after two aggregates have met: they are welded over the least film's length on both
     sides of the point where they are nearest. speed: as for :func:`remeshing.remesh`."""
     film = mechanics.keys.minimum_film
-    outlines = welds.facing(*pore.outlines, film)
+    first, second = pore.outlines
+    outlines = welds.facing(first, second, film)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
     shape = Welding(mechanics, facing, facing, reach=film).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
@@ -255,8 +256,9 @@ class Welding:
             forces = np.zeros((len(nodes), 2))
             np.add.at(forces, number[mesh.body], self.forces)
         rest = growth.equilibrium(
-            solid, mesh.by_triangle(thetas), shape.mesh.points[nodes], shape.pressure[nodes[:corners]],
-            prescribed[nodes], target[nodes], forces=forces, supports=supports,
+            solid, mesh.by_triangle(thetas), shape.mesh.points[nodes],
+            shape.pressure[nodes[:corners]], prescribed[nodes], target[nodes], forces=forces,
+            supports=supports,
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
         points = shape.mesh.points.copy()
