@@ -29,6 +29,9 @@ STILL_OPPOSITE = 0.6
 #: The surfaces have opposite corners where the film between them is thinner than this, over the
 #: least film.
 MATCHED_FILMS = 3.0
+#: Size beside the line, at least, over the least film: ``exact`` has no equilibrium with an
+#: eightieth.
+FINEST = 0.125
 #: A point nearer to a corner than this part of an arc is that corner.
 AT_CORNER = 0.05
 #: Rounds that find the nearest points of two outlines, each on intervals an eighth as long.
@@ -149,15 +152,16 @@ def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
 def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """The same curves with the edges beyond a weld divided into equal parts.
 
-    The parts are at most as long as ``sizing.moving_lines`` over the least film from the line, and
-    grow from there.
+    The parts are at most as long as ``sizing.moving_lines``, or FINEST, over the least film from
+    the line, and grow from there.
     """
     cuts: tuple[list, list] = ([], [])
+    line = max(sizing.moving_lines, FINEST * sizing.film)
     for walks in notches(*outlines):
         for outline, walk, cut_at in zip(outlines, walks, cuts):
             lengths = lengths_from(outline, walk)
             beyond = np.maximum(lengths[:-1] - sizing.film, 0.0)
-            size = sizing.moving_lines + sizes_of.GRADATION * beyond
+            size = line + sizes_of.GRADATION * beyond
             parts = np.maximum(1, np.ceil(np.diff(lengths) / size)).astype(int)
             for start, end, count in zip(lengths, lengths[1:], parts):
                 cut_at.extend(_places(outline, walk, np.linspace(start, end, count + 1)[1:-1]))

@@ -177,8 +177,9 @@ def surface_supports(solid: Solid, shape: Pore) -> list[Support]:
     """
     outline = shape.boundary
     rim = shape.region.own_loop
+    walls = shape.walls
     bearing = []
-    for wall in shape.walls:
+    for wall in walls:
         edges = rim[outline.edges_on(wall.number)]
         points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]
         if len(edges) and len(points):
