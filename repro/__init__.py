@@ -52,6 +52,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  shape in contact              repro.model.contact, .mechanics (one equilibrium)
     2.3.3  closing of films                 repro.model.closing_by_nodes, .closing_by_lines
            contact lines                    repro.model.contact_lines, .contact_newton
+           welds (not the paper's)          repro.model.welding, repro.fem.welds
     5    adhesion, tearing                  repro.model.adhesion
          erosion (not the paper's)          repro.model.erosion
          receding outlines                  repro.fem.recession

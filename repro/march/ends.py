@@ -20,6 +20,9 @@ erosion has worn down, leaves the pore, and the run goes on. If it touches both 
 them gives way, or erosion takes a contact surface, the run ends: the model has no law for a surface
 that is set free.
 
+With growth.meeting = "weld" two aggregates that meet join (:mod:`repro.model.welding`), and the run
+goes on.
+
 With growth.until = "steady" a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
 
@@ -82,7 +85,8 @@ class PoreEnd(RunEnd):
 
 
 class Meeting(RunEnd):
-    """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
+    """Two aggregates meet, and ``growth.meeting`` is ``"end"``: the film between them is thinner
+    than ``growth.minimum_film``.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the place (um).

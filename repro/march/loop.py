@@ -10,7 +10,8 @@ later end restarts from the state before the cut step.
 A step ends at a jump of the scene's tables. Its row has the state just after the jump: with forces
 of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 (:func:`settle`). A
 step also ends where an aggregate leaves the pore (``growth.after_detachment``). Its row has the
-state just after that, without the aggregate, and its ledger has the mass that has left.
+state just after that, without the aggregate, and its ledger has the mass that has left. Where two
+aggregates meet and join (``growth.meeting``), a step ends with the state just after that.
 """
 
 from __future__ import annotations
