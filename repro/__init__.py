@@ -38,7 +38,7 @@ Sections of the paper and their modules, which name the equations that they solv
     section                    equations    module
     Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
     3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
-    3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division
+    3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division, .welds
     2.1, 2.3.3  walls                       repro.fem.walls
     3.5  transfer to a new mesh             repro.fem.transfer
     2.1, 3.2  flow             (1)-(6)      repro.model.flow, .interface, .resistance, .brinkman
@@ -52,7 +52,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  shape in contact              repro.model.contact, .mechanics (one equilibrium)
     2.3.3  closing of films                 repro.model.closing_by_nodes, .closing_by_lines
            contact lines                    repro.model.contact_lines, .contact_newton
-           welds (not the paper's)          repro.model.welding, repro.fem.welds
+         welds (not the paper's)            repro.model.welding
     5    adhesion, tearing                  repro.model.adhesion
          erosion (not the paper's)          repro.model.erosion
          receding outlines                  repro.fem.recession

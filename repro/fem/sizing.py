@@ -127,7 +127,7 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
     """(M,) size (um) that grows from the contact lines with the opposite wall; inf without them."""
-    on = ~np.isin(outline.wall, (FREE, WELD, outline.seat.wall))
+    on = (outline.wall != FREE) & (outline.wall != WELD) & (outline.wall != outline.seat.wall)
     if sizing.contact == inf or not on.any():
         return inf
     lines = outline.points[on & ~(np.roll(on, 1) & np.roll(on, -1))]

@@ -85,8 +85,9 @@ class PoreEnd(RunEnd):
 
 
 class Meeting(RunEnd):
-    """Two aggregates meet, and ``growth.meeting`` is ``"end"``: the film between them is thinner
-    than ``growth.minimum_film``.
+    """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
+
+    With ``growth.meeting = "weld"`` they join instead, and the run goes on.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the place (um).
