@@ -38,8 +38,8 @@ Sections of the paper and their modules, which name the equations that they solv
     section                    equations    module
     Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
     3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
-    3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division, .welds
-    2.1, 2.3.3  walls                       repro.fem.walls
+    3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division
+    2.1, 2.3.3  walls                       repro.fem.walls, .welds (of aggregates)
     3.5  transfer to a new mesh             repro.fem.transfer
     2.1, 3.2  flow             (1)-(6)      repro.model.flow, .interface, .resistance, .brinkman
     2.2  kinetics              (7)-(10)     repro.model.uptake_law, .kinetics
