@@ -39,7 +39,7 @@ Sections of the paper and their modules, which name the equations that they solv
     Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
     3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
     3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh, .division
-    2.1, 2.3.3  walls                       repro.fem.walls
+    2.1, 2.3.3  walls                       repro.fem.walls, .welds (of aggregates)
     3.5  transfer to a new mesh             repro.fem.transfer
     2.1, 3.2  flow             (1)-(6)      repro.model.flow, .interface, .resistance, .brinkman
     2.2  kinetics              (7)-(10)     repro.model.uptake_law, .kinetics
@@ -52,6 +52,7 @@ Sections of the paper and their modules, which name the equations that they solv
     2.3, 3.4  shape in contact              repro.model.contact, .mechanics (one equilibrium)
     2.3.3  closing of films                 repro.model.closing_by_nodes, .closing_by_lines
            contact lines                    repro.model.contact_lines, .contact_newton
+         welds (not the paper's)            repro.model.welding
     5    adhesion, tearing                  repro.model.adhesion
          erosion (not the paper's)          repro.model.erosion
          receding outlines                  repro.fem.recession

@@ -14,6 +14,7 @@ PARTS = {
         "repro.fem.division", "repro.fem.transfer",
         *(f"repro.march.{name}" for name in ("balance", "ends", "folding", "loop"))},
     "erosion": {"repro.model.erosion", "repro.fem.recession"},
+    "weld": {"repro.model.welding"},
     "eroding": {"repro.march.eroding"},
     "midpoint": {"repro.march.midpoint", "repro.march.stepping"},
     "updates": {"repro.march.updates"},

@@ -24,7 +24,7 @@ PRESETS = pytest.mark.parametrize("preset", ["fast", "paper"])
 @pytest.fixture
 def folded(monkeypatch):
     """Positions at t = 0 fold on every new mesh."""
-    def fold(mesh, origin):
+    def fold(mesh, origin, region):
         raise OriginFolded("the places at t = 0 fold")
 
     def apply():

@@ -20,6 +20,7 @@ from mmgpy import MmgMesh2D
 
 from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
+from repro.fem import welds
 from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import Mesh, curved, triangle_areas
 from repro.fem.outline import Outline
@@ -66,6 +67,7 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
     for _ in range(HALVINGS):
         outlines = [sizes_of.split(outline, beside)
                     for outline, beside in sizes_of.each_beside(outlines, sizing)]
+        outlines = welds.matched(outlines, sizing)
         corners = [outline.corners for outline in outlines]
         for polygon in corners:
             check_outline(polygon, ends, sizing.walls)
@@ -124,14 +126,8 @@ def around(outlines: Sequence[Outline], ends: tuple[float, float], sizing: Sizin
     points, polygons = _boundaries(outlines, ends, element_sizes)
     (points, triangles, region), places = _fill(points, polygons, element_sizes.at)
     # The outlines' points come first among the prescribed ones.
-    loops = tuple(places[own] for own in _own_points(outlines))
+    loops = tuple(places[own] for own in welds.shared_points(outlines)[1])
     return Mesh.of(points, triangles, region - 1, loops, sizing.walls, ends, method)
-
-
-def _own_points(outlines: Sequence[Outline]) -> list[np.ndarray]:
-    """Numbers of the points of each outline among those of all."""
-    first = np.cumsum([0, *(len(outline.points) for outline in outlines)])
-    return [np.arange(start, end) for start, end in zip(first, first[1:])]
 
 
 def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> None:
@@ -153,8 +149,11 @@ def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> 
 
 
 def check_apart(outlines: Sequence[Outline]) -> None:
-    """Raise MeshError if two outlines touch."""
-    for outline, other in combinations(outlines, 2):
+    """Raise MeshError if two outlines touch beside a weld."""
+    united, _ = welds.united(outlines, welds.shared_points(outlines)[1])
+    if not all(shapely.Polygon(outline.points).is_valid for outline in united):
+        raise MeshError("two welded aggregates touch beside their weld")
+    for outline, other in combinations(united, 2):
         if shapely.Polygon(outline.points).intersects(shapely.Polygon(other.points)):
             raise MeshError("two aggregates touch, and contact is modelled with the walls alone")
 
@@ -167,9 +166,10 @@ def _boundaries(outlines: Sequence[Outline], ends: tuple[float, float],
         corners = _around(walls, ends)
         rim = element_sizes.path(*corners, corners[0])
         return rim, [(np.arange(len(rim)), 0)]
-    store = _PointStore(np.concatenate([outline.points for outline in outlines]))
-    fluid = _Fluid(outlines, walls, ends, element_sizes, store).polygons()
-    bodies = [(points, number) for number, points in enumerate(_own_points(outlines), 1)]
+    points, own = welds.shared_points(outlines)
+    store = _PointStore(points)
+    fluid = _Fluid(*welds.united(outlines, own), walls, ends, element_sizes, store).polygons()
+    bodies = [(nodes, number) for number, nodes in enumerate(own, 1)]
     return store.points, [*fluid, *bodies]
 
 
@@ -183,10 +183,11 @@ def _around(walls: Sequence[Wall], ends: tuple[float, float]) -> np.ndarray:
 class _Fluid:
     """The fluid around aggregates: one polygon between any two that touch both walls."""
 
-    def __init__(self, outlines: Sequence[Outline], walls: Walls, ends: tuple[float, float],
+    def __init__(self, outlines: Sequence[Outline], own: Sequence[np.ndarray], walls: Walls,
+                 ends: tuple[float, float],
                  element_sizes: ElementSizes, store: _PointStore):
         self._outlines = outlines
-        self._own = _own_points(outlines)
+        self._own = own
         # The polygons run along the wall of a seed first.
         self._walls = outlines[0].seat.walls(walls)
         self._corners = _around(self._walls, ends)
@@ -386,32 +387,34 @@ def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
 def unlocked(straight: Mesh) -> Mesh:
     """The same nodes without triangles that have two edges on the boundary of their region.
 
-    A region is the fluid or the biomass. In these triangles linear pressures leave quadratic
+    A region is the fluid or an aggregate. In these triangles linear pressures leave quadratic
     displacements too little freedom. If possible, the corner's inner edge is exchanged for the
     other diagonal.
     """
     triangles = straight.triangles.copy()
-    for corner in _cornered(triangles, straight.biomass):
-        _flip(straight.points, triangles, straight.biomass, corner)
+    region = straight.topology.region
+    for corner in _cornered(triangles, region):
+        _flip(straight.points, triangles, region, corner)
     return replace(straight, topology=replace(straight.topology, cells=triangles))
 
 
-def _region_edges(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:
+def _region_edges(triangles: np.ndarray, region: np.ndarray) -> np.ndarray:
     """(T, 3) True where edge i -> i + 1 is on the boundary of the triangle's region."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-    keys = (edges[:, 0] * (edges.max() + 1) + edges[:, 1]) * 2 + np.repeat(biomass, 3)
+    keys = (edges[:, 0] * (edges.max() + 1) + edges[:, 1]) * (region.max() + 1)
+    keys += np.repeat(region, 3)
     _, edge_numbers, counts = np.unique(keys, return_inverse=True, return_counts=True)
     return (counts[edge_numbers] == 1).reshape(-1, 3)
 
 
-def _cornered(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:
-    return np.flatnonzero(_region_edges(triangles, biomass).sum(axis=1) == 2)
+def _cornered(triangles: np.ndarray, region: np.ndarray) -> np.ndarray:
+    return np.flatnonzero(_region_edges(triangles, region).sum(axis=1) == 2)
 
 
-def _flip(points: np.ndarray, triangles: np.ndarray, biomass: np.ndarray, corner: int) -> None:
+def _flip(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, corner: int) -> None:
     """Exchange, in place, the inner edge of a cornered triangle for the other diagonal of the
     quadrilateral that it forms with its neighbour."""
-    outer = _region_edges(triangles, biomass)[corner]
+    outer = _region_edges(triangles, region)[corner]
     if outer.sum() == 2:
         _exchange(points, triangles, corner, int(np.flatnonzero(~outer)[0]))
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, Walls, numbered, whole_width, width_between
+from repro.fem.walls import FREE, WELD, Walls, numbered, whole_width, width_between
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -127,7 +127,7 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
     """(M,) size (um) that grows from the contact lines with the opposite wall; inf without them."""
-    on = (outline.wall != FREE) & (outline.wall != outline.seat.wall)
+    on = (outline.wall != FREE) & (outline.wall != WELD) & (outline.wall != outline.seat.wall)
     if sizing.contact == inf or not on.any():
         return inf
     lines = outline.points[on & ~(np.roll(on, 1) & np.roll(on, -1))]
@@ -175,7 +175,7 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
     that a film has elements of one size. Short interface edges are never merged, so the elements
     around them are small too.
     """
-    free = outline.wall == FREE
+    free = (outline.wall == FREE) | (outline.wall == WELD)
     near = interface_sizes(outline, sizing)[free]
     edge = outline.edge_lengths()
     near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
@@ -216,11 +216,14 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     """
     polygon = outline.corners
     sizes = interface_sizes(polygon, sizing)
-    on_wall = outline.edge_wall != FREE
+    edge_wall = outline.edge_wall
     pieces = []
     for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(polygon.points)
-        if on_wall[keep[0]]:
+        if edge_wall[keep[0]] == WELD:  # its nodes are those of the other aggregate
+            halves = np.arange(outline.geometry) / outline.geometry
+            pieces.append((np.repeat(keep[:-1], len(halves)), np.tile(halves, len(keep) - 1)))
+        elif edge_wall[keep[0]] != FREE:
             pieces.append(_on_the_wall(outline, keep, sizes, sizing))
         else:
             parts = outline.geometry * split_count(polygon, keep, sizes)
@@ -301,7 +304,7 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
         ends = outline.arcs(outline.origin)[edge]
         origin = seed + _on_arc(origin - seed, ends[:, 0] - seed, ends[:, 2] - seed)
     wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
-    on = wall != FREE
+    on = (wall != FREE) & (wall != WELD)
     points[on, 1] = outline.points[corner[on], 1]
     points[first] = outline.points[corner[first]]
     origin[first] = outline.origin[corner[first]]

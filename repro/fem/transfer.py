@@ -22,7 +22,7 @@ from repro.errors import OriginFolded, TransferError, failing_as
 from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem
 from repro.fem.forms import mass
-from repro.fem.mesh import Mesh, checked_map_derivatives, triangle_areas
+from repro.fem.mesh import Mesh, Region, checked_map_derivatives, triangle_areas
 from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
@@ -136,14 +136,15 @@ def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
     return interpolate(points, triangles, fields, new_points)
 
 
-def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
-    """Coordinates at t = 0 (N, 2) um for which no triangle of the aggregate is turned over.
+def unfolded(mesh: Mesh, origin: np.ndarray, region: Region | None = None) -> np.ndarray:
+    """Coordinates at t = 0 (N, 2) um for which no triangle of an aggregate, or of all, is turned
+    over.
 
     In a triangle that is turned over, middles move half way between their corners. Its neighbours
     have the same middles, so they are tested again. Raises OriginFolded if a triangle with straight
     edges is turned over.
     """
-    cells = mesh.cells[mesh.biomass]
+    cells = region.cells if region else mesh.cells[mesh.biomass]
     derivatives = checked_map_derivatives(mesh.geometry)
     while True:
         det = elements.determinant(elements.jacobian(origin[cells], derivatives))

@@ -23,6 +23,8 @@ import numpy as np
 FREE = 0
 BOTTOM = 1
 TOP = 2
+#: Number of no wall: the surface of another aggregate, to which an aggregate is welded.
+WELD = 3
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,9 @@ erosion has worn down, leaves the pore, and the run goes on. If it touches both 
 them gives way, or erosion takes a contact surface, the run ends: the model has no law for a surface
 that is set free.
 
+With growth.meeting = "weld" two aggregates that meet join (:mod:`repro.model.welding`), and the run
+goes on.
+
 With growth.until = "steady" a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
 
@@ -46,8 +49,8 @@ from repro.model import adhesion
 from repro.model.adhesion import Loading, Peak
 from repro.model.pore import Pore
 from repro.model.solving import Solved
+from repro.scene import Growth, Scene, Stated, TimeTables
 from repro.scene import Pore as Channel
-from repro.scene import Scene, Stated, TimeTables
 
 #: An end is located if its margin is positive and at most this. The relative error of its time is
 #: this over d ln(stress) / d ln(t). The least numerics.tolerance of a preset is 2.5e-4.
@@ -83,6 +86,8 @@ class PoreEnd(RunEnd):
 
 class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
+
+    With ``growth.meeting = "weld"`` they join instead, and the run goes on.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the place (um).
@@ -144,12 +149,13 @@ class Event:
     """An end of a run: its margin in a state, and the exception that reports it there.
 
     leaves: place in the list of the aggregate that leaves the pore instead if the scene continues
-    after detachment; None if the run ends.
+    after detachment; None if the run ends. joins: do two aggregates join instead?
     """
 
     margin: float
     end: RunEnd
     leaves: int | None = None
+    joins: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +177,11 @@ class Reached:
         text = (f"{end}; it may happen earlier, after t = {after:g} h, since a shorter step fails: "
                 f"{error}")
         return replace(self, event=replace(self.event, end=type(end)(text)))
+
+    @property
+    def joins(self) -> bool:
+        """Do two aggregates join there?"""
+        return self.event.joins and self.event.margin > 0
 
     def leaves(self, continues: bool) -> int | None:
         """Place in the list of the aggregate that leaves the pore there, None without one.
@@ -255,7 +266,7 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(pore.biot / compression.stretch - 1, fold)
-    yield from _meetings(ends.loading.growth.minimum_film, pore)
+    yield from _meetings(ends.loading.growth, pore)
     if ends.loading.growth.erosion:
         yield from _eroded(ends.loading.growth.minimum_film, pore)
     if ends.bonding is not None:
@@ -279,17 +290,20 @@ def _eroded(least: float, pore: Pore) -> Iterator[Event]:
         yield Event(least / extent - 1, end, None if body.spans else number)
 
 
-def _meetings(least: float, pore: Pore) -> Iterator[Event]:
-    """The events of all pairs of aggregates; least: um, film that closes."""
+def _meetings(growth: Growth, pore: Pore) -> Iterator[Event]:
+    """The events of all pairs of aggregates that are not welded."""
+    least = growth.minimum_film
     for pair, film, (x, y) in _films(pore):
         end = Meeting(f"{pair} meet at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the "
                       f"film between them is {film:.3g} um, and it closes below "
                       f"growth.minimum_film, {least:g} um; no model follows")
-        yield Event(1 - film / least, end)
+        yield Event(1 - film / least, end, joins=growth.welds)
 
 
 def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:
     """Names of each pair of aggregates, the film (um) between them and its place (2,) um."""
+    if pore.welded:
+        return
     for (one, outline), (other, beside) in combinations(zip(pore.bodies, pore.outlines), 2):
         yield f"aggregates {one.name} and {other.name}", *outline.film(beside)
 

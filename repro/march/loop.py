@@ -10,7 +10,8 @@ later end restarts from the state before the cut step.
 A step ends at a jump of the scene's tables. Its row has the state just after the jump: with forces
 of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 (:func:`settle`). A
 step also ends where an aggregate leaves the pore (``growth.after_detachment``). Its row has the
-state just after that, without the aggregate, and its ledger has the mass that has left.
+state just after that, without the aggregate, and its ledger has the mass that has left. Where two
+aggregates meet and join (``growth.meeting``), a step ends with the state just after that.
 """
 
 from __future__ import annotations
@@ -199,6 +200,8 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
         end = replace(end, step=replace(end.step, within=step.within))
     elif stages.tables.jumps(step.pore.time):
         end = reached(*_after_jump(stages, step, after))
+    if end.joins:
+        end = reached(*_after_meeting(stages, end))
     leaves = end.leaves(stages.growth.continues)
     while leaves is not None:
         end = reached(*_after_detachment(stages, end, leaves))
@@ -218,6 +221,14 @@ def _after_detachment(stages: Stages, reached: Reached,
     departed = (*step.departed, str(reached.event.end))
     return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True,
                    departed=departed), solved
+
+
+def _after_meeting(stages: Stages, reached: Reached) -> tuple[StepResult, Solved]:
+    """Return the state just after two aggregates have joined."""
+    step = reached.step
+    after, solved = stages.grading.solve(stages.weld(step.pore, reached.solved))
+    ledger = replace(step.ledger, biomass_after=after.mass)
+    return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 
 
 def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepResult, Solved]:

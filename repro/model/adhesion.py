@@ -199,6 +199,9 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
         water = flow.solve(rest.space, driven, loading.length, interface=loading.interface)
         solved = replace(solved, flow=water)
         forces = fluid_forces(loading, rest, solved) / loading.growth.shear_modulus
+    if rest.welded:
+        from repro.model.welding import Welding  # a run without a weld does not load it
+        return Welding(mechanics, rest, rest, forces).equilibrium(), solved
     for number, region in enumerate(rest.mesh.regions):
         seen = rest.focused(number)
         own = None if forces is None else rest.mesh.of_region(region, forces)

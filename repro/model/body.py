@@ -66,5 +66,5 @@ class Body:
 
     @property
     def spans(self) -> bool:
-        """Does it touch both walls?"""
+        """Does it touch both walls, or its own one and another aggregate?"""
         return bool(np.ptp(self.wall[self.wall != FREE]) > 0)

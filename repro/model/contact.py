@@ -225,6 +225,9 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
                       configuration=body.configuration.restarted(mesh.points[region.nodes]))
               for body, expansion, region in zip(grown.bodies, theta, mesh.regions, strict=True)]
     shape = Expansion(replace(grown, bodies=tuple(bodies)), 0)
+    if grown.welded:
+        from repro.model.welding import Welding  # a run without a weld does not load it
+        return Welding(mechanics, shape.pore, start, forces, patient=search.patient).close()
     for number, region in enumerate(mesh.regions):
         own = None if forces is None else mesh.of_region(region, forces)
         closing = CLOSINGS[mesh.geometry](mechanics, shape.pore.focused(number),

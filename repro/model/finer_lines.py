@@ -26,9 +26,10 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
 
     bisection = refined(pore.mesh, pore.outlines, size_at)
     space = Space(bisection.mesh)
-    origin = bisection.nodal(pore.origin)
+    origins = [bisection.nodal(pore.mesh.from_region(region, body.reference))
+               for body, region in zip(pore.bodies, pore.mesh.regions)]
     solids = [material(space, region, origin[region.nodes], body.solid.energy)
-              for body, region in zip(pore.bodies, space.mesh.regions)]
+              for body, origin, region in zip(pore.bodies, origins, space.mesh.regions)]
     expanded = bisection.of_each([body.theta * body.solid.at.dx for body in pore.bodies],
                                  _areas(pore, pore.mesh, [body.solid for body in pore.bodies]),
                                  _areas(pore, space.mesh, solids),

@@ -16,7 +16,7 @@ import numpy as np
 from repro.fem.division import Division
 from repro.fem.outline import Outline
 from repro.fem.refinement import Bisection
-from repro.fem.walls import FREE
+from repro.fem.walls import FREE, WELD
 from repro.model import growth
 from repro.model.contact_lines import Advances, SearchOptions
 from repro.model.pore import Pore
@@ -160,10 +160,20 @@ def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
 
 
 def supports_of(solid: Solid, shape: Pore, forces: np.ndarray | None) -> list[Support]:
+    """The supports of the contact surfaces of ``solid``, by :func:`surface_supports`.
+
+    Without ``forces`` (n, 2) one surface alone bears none, because the forces of growth along the
+    pore add up to zero.
+    """
+    bearing = surface_supports(solid, shape)
+    alone = len(bearing) == 1 and not any(wall.bonded for wall in shape.walls)
+    return [] if alone and forces is None else bearing
+
+
+def surface_supports(solid: Solid, shape: Pore) -> list[Support]:
     """The supports of the contact surfaces of ``solid`` that slide and have a fixed point.
 
-    A surface of a single node has no length; the node bears its force. Without ``forces`` (n, 2)
-    one surface alone bears none, because the forces of growth along the pore add up to zero.
+    A surface of a single node has no length; the node bears its force.
     """
     outline = shape.boundary
     rim = shape.region.own_loop
@@ -174,8 +184,7 @@ def supports_of(solid: Solid, shape: Pore, forces: np.ndarray | None) -> list[Su
         points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]
         if len(edges) and len(points):
             bearing.append(Support.on(int(points[0]), edges, solid.reference))
-    alone = len(bearing) == 1 and not any(wall.bonded for wall in walls)
-    return [] if alone and forces is None else bearing
+    return bearing
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
@@ -185,7 +194,7 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
     """
     prescribed = np.zeros((count, 2), bool)
     prescribed[rim[fixed], 0] = True
-    prescribed[rim[wall != FREE], 1] = True
+    prescribed[rim[(wall != FREE) & (wall != WELD)], 1] = True
     return prescribed
 
 

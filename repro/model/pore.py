@@ -13,7 +13,7 @@ from repro.fem.brief import brief
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
-from repro.fem.walls import Walls
+from repro.fem.walls import WELD, Walls
 from repro.model.body import Body
 from repro.scene import needed
 
@@ -70,6 +70,11 @@ class Pore:
     def spanning(self) -> int:
         """Number of aggregates that touch all walls."""
         return sum(body.spans for body in self.bodies)
+
+    @property
+    def welded(self) -> bool:
+        """Are its two aggregates welded to each other?"""
+        return any((body.wall == WELD).any() for body in self.bodies)
 
     @property
     def accumulates(self) -> bool:

@@ -17,7 +17,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.transfer import Located
-from repro.fem.walls import FREE
+from repro.fem.walls import FREE, WELD
 from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
 from repro.model.body import Body
@@ -115,7 +115,7 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     position = generated.at.field(old.points, old.cells[old.biomass])
     points = start.mesh.from_body(position, start.mesh.points)
     for body, region in zip(start.bodies, start.mesh.regions):
-        on_wall = region.loop[body.wall != FREE]
+        on_wall = region.loop[(body.wall != FREE) & (body.wall != WELD)]
         points[on_wall, 1] = start.mesh.points[on_wall, 1]
     mesh = moved_mesh(rules.meshing, start, start.moved(points))
     if mesh is None:
@@ -151,7 +151,8 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
 
 
 def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
-           amounts: Amounts = ()) -> tuple[Pore, Amounts]:
+           amounts: Amounts = (),
+           outlines: Sequence[Outline] | None = None) -> tuple[Pore, Amounts]:
     """Make a new mesh around the aggregates, with the extent of 3.1, and transfer all fields to it.
 
     Parameters
@@ -166,6 +167,8 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
         substrates are only a first guess.
     amounts : tuple of (r, q) arrays, optional
         Further amounts of the aggregate's material.
+    outlines : sequence of Outline, optional
+        The same curves as those of ``expanded``, with other nodes.
 
     Returns
     -------
@@ -180,7 +183,7 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     Where strain adds up and shares are transferred, the new densities interpolate theta: J is rough
     where strain is singular.
     """
-    mesh, outlines = rules.meshing.around(expanded.outlines, expanded.front)
+    mesh, outlines = rules.meshing.around(outlines or expanded.outlines, expanded.front)
     new = Space(mesh)
     at = _located_in(expanded, mesh)
     bodies = _on_new_mesh(new, expanded, outlines, at)
@@ -254,6 +257,9 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
         def carry(positions: np.ndarray, before: Region = expanded.mesh.regions[number],
                   after: Region = target.mesh.regions[number]) -> np.ndarray:
             nodal = old.from_region(before, positions)
+            if target.welded:  # the nodes of the weld have other positions in the other aggregate
+                own = transfer.located(old.points, before.cells, target.mesh.points[after.nodes])
+                return own.field(nodal, before.cells)
             carried = target.mesh.from_body(at.field(nodal, old.cells[old.biomass]))
             return carried[after.nodes]
         configuration = expanded.bodies[number].configuration.carried(carry)
@@ -302,21 +308,23 @@ def _on_new_mesh(new: Space, expanded: Pore, outlines: Sequence[Outline],
     """
     mesh = new.mesh
     old = expanded.mesh
-    origin = mesh.from_body(at.field(expanded.origin, old.cells[old.biomass]), mesh.points)
-    for region, outline in zip(mesh.regions, outlines):
+    bodies = []
+    for body, outline, before, region in zip(expanded.bodies, outlines, old.regions, mesh.regions):
+        inside = at.field(old.from_region(before, body.reference), old.cells[old.biomass])
+        origin = mesh.from_body(inside, mesh.points)
         origin[region.loop] = outline.origin
-    try:
-        origin = transfer.unfolded(mesh, origin)
-        known = True
-    except OriginFolded:
-        if any(body.configuration.accumulates for body in expanded.bodies):
-            raise
-        origin = mesh.points
-        known = False
-    return tuple(replace(body, wall=outline.wall, fixed=outline.fixed,
-                         solid=material(new, region, origin[region.nodes], body.solid.energy),
-                         origin_known=known and body.origin_known)
-                 for body, outline, region in zip(expanded.bodies, outlines, mesh.regions))
+        known = body.origin_known
+        try:
+            origin = transfer.unfolded(mesh, origin, region)
+        except OriginFolded:
+            if body.configuration.accumulates:
+                raise
+            origin = mesh.points
+            known = False
+        solid = material(new, region, origin[region.nodes], body.solid.energy)
+        bodies.append(replace(body, wall=outline.wall, fixed=outline.fixed, solid=solid,
+                              origin_known=known))
+    return tuple(bodies)
 
 
 def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Concentrations | None,

@@ -84,6 +84,11 @@ class Stages:
         """The pore without one of its aggregates, by :func:`remeshing.without`."""
         return remeshing.without(self.remeshing, pore, number, solved.mean_velocity)
 
+    def weld(self, pore: Pore, solved: Solved) -> Pore:
+        """The pore after its two aggregates have joined, by :func:`welding.join`."""
+        from repro.model import welding  # a run without a weld does not load it
+        return welding.join(self.mechanics, self.remeshing, pore, solved.mean_velocity)
+
     def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved,
                  generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:
         """Give an expanded aggregate a mesh, by :func:`remeshing.new_mesh`."""

@@ -387,6 +387,9 @@ class Growth:
     limiting_invariant: float = number(
         LIMITING, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
         about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
+    meeting: str = choice(
+        "end", "weld", source="Section 5, without a model",
+        about="Two aggregates that meet end the run, or join and share their motion from then on")
     until: str = choice(
         "end", "steady",
         about="The run goes on to end, or ends early if the aggregates are steady")
@@ -407,6 +410,11 @@ class Growth:
     def continues(self) -> bool:
         """Whether an aggregate that detaches leaves the pore, and the run goes on."""
         return self.after_detachment == "continue"
+
+    @property
+    def welds(self) -> bool:
+        """Whether two aggregates that meet join."""
+        return self.meeting == "weld"
 
     @property
     def until_steady(self) -> bool:
@@ -681,7 +689,8 @@ LATER: dict[str, dict[str, object]] = {
     "pore": {"upper_wall": "no slip"},
     "aggregate": {"position": "0.0 um", "wall": "lower", "smooth": False, "inert_fraction": 0.0},
     "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0,
-               "after_detachment": "end", "until": "end", "steady_tolerance": STEADY},
+               "after_detachment": "end", "meeting": "end", "until": "end",
+               "steady_tolerance": STEADY},
     "numerics": {"contact_elements": 0.0},
     "substrates.donor": {"inhibition_constant": "100.0 mg/L"},
     "kinetics": {"law": "dual Monod", "decay": "with acceptor"},

@@ -7,6 +7,7 @@ FOLD_TESTS = "tests/test_fold.py::test_"
 ENDS = "tests/test_ends.py::test_"
 BODIES = "tests/test_bodies.py::test_"
 EROSION = "tests/test_erosion.py::test_"
+WELDS = "tests/test_welds.py::test_"
 SUPPORT_TESTS = "tests/test_support.py::test_"
 ROUNDS_TESTS = "tests/test_traction.py::test_rounds_"
 PARTS_TESTS = "tests/test_refinement.py::test_"
@@ -289,6 +290,25 @@ end = grown.step.pore"""),
          "True",
          f"{EROSION}no_state_is_steady_before_the_last_time_of_a_table")),
     *changes(
+        "repro/model/welding.py",
+        ("weld-slips",
+         "The nodes of a weld keep their own displacements.",
+         "Welding._equilibrium",
+         "alias[tied[:, 1]] = tied[:, 0]",
+         "alias[tied[:, 1]] = tied[:, 1]"),
+        ("weld-with-one-reference",
+         "The nodes of a weld have the reference of the second aggregate in both.",
+         "Welding._equilibrium",
+         "mesh.by_triangle(in_triangles)",
+         "reference[cells]",
+         f"{WELDS}welded_aggregates_are_the_mirror_image_of_one_at_a_plane_of_symmetry"),
+        ("weld-without-angle",
+         "Beside a weld the water may be as thin as it likes.",
+         "Notch._too_thin",
+         "(gap < needs).any()",
+         "False",
+         f"{WELDS}a_weld_does_not_advance_beyond_its_opposite_nodes")),
+    *changes(
         "repro/march/loop.py",
         ("detached-mass-is-lost",
          "The mass of an aggregate that leaves the pore is in no ledger.",
@@ -451,7 +471,7 @@ end = grown.step.pore"""),
          "start.pressure[inside] / mechanics.keys.shear_modulus"),
         ("support-of-the-lower-wall-alone",
          "Only the lower contact surface is kept in place by a traction; a point keeps the upper one.",
-         "supports_of",
+         "surface_supports",
          "for wall in walls:\n"
          "    edges = rim[outline.edges_on(wall.number)]\n"
          "    points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]\n"
@@ -465,13 +485,13 @@ end = grown.step.pore"""),
          f"{SUPPORT_TESTS}simple_shear_between_two_walls_is_exact[2]"),
         ("support-along-the-present-surface",
          "The traction is uniform along the present surface, so the youngest tissue shears most.",
-         "supports_of",
+         "surface_supports",
          "Support.on(int(points[0]), edges, body.reference)",
          "Support.on(int(points[0]), edges, shape.mesh.points[shape.mesh.body])",
          f"{SUPPORT_TESTS}the_traction_is_uniform_per_length_of_the_reference[2]"),
         ("bonded-wall-is-supported",
          "A bonded surface has the traction of a sliding one, too.",
-         "supports_of",
+         "surface_supports",
          "rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]",
          "rim[outline.fixed & (outline.wall == wall.number)]",
          f"{SUPPORT_TESTS}a_traction_acts_on_each_surface_that_slides[2-bonded-walls1]"),
@@ -1104,7 +1124,7 @@ end = grown.step.pore"""),
         ("display-stops-runs",
          "Positions at t = 0 that fold stop a run whose strain does not count from them.",
          "_on_new_mesh",
-         "any(body.configuration.accumulates for body in expanded.bodies)",
+         "body.configuration.accumulates",
          "True",
          "tests/test_origin.py::test_nothing_but_fields_depends_on_positions_at_the_start"),
         ("folded-positions-shown",

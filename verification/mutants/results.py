@@ -2577,8 +2577,8 @@ MUTANTS = (
         ("front-coarser-later",
          "After t = 0 elements at a front are halved only once.",
          "remesh",
-         "rules.meshing.around(expanded.outlines, expanded.front)",
-         "rules.meshing.around(expanded.outlines, min(expanded.front, 2.0))",
+         "rules.meshing.around(outlines or expanded.outlines, expanded.front)",
+         "rules.meshing.around(outlines or expanded.outlines, min(expanded.front, 2.0))",
          DEEPEST)),
     *changes(
         "repro/sweeps/table.py",

@@ -1,0 +1,254 @@
+"""Aggregates that are welded to each other: their boundaries share the nodes of the weld.
+
+Nodes of a weld have the number WELD in the contact of both outlines, and the same places to the
+last bit. Each outline keeps its own places at t = 0. Beyond an end of the weld the free surfaces of
+both aggregates form a notch. Its corners are opposite each other: the k-th corner of one surface
+from the line belongs to the k-th of the other one, at about the same length along its surface. A
+new mesh gives both surfaces these corners (:func:`matched`), so that the weld can advance by nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from repro.errors import MeshError
+from repro.fem import sizing as sizes_of
+from repro.fem.outline import ON_ARC, Outline, parabola
+from repro.fem.sizing import Sizing, placed
+from repro.fem.walls import FREE, WELD
+
+#: Corners of the two surfaces are opposite if their lengths from the line differ by at most this
+#: part of the shortest edge beside them. Below a half, no corner has two opposite ones.
+OPPOSITE = 0.3
+#: Corners that a new mesh has made opposite count as such up to this part, because their lengths
+#: change with growth.
+STILL_OPPOSITE = 0.6
+#: The surfaces have opposite corners where the film between them is thinner than this, over the
+#: least film.
+MATCHED_FILMS = 3.0
+#: Size beside the line, at least, over the least film: ``exact`` has no equilibrium with an
+#: eightieth.
+FINEST = 0.125
+#: A point nearer to a corner than this part of an arc is that corner.
+AT_CORNER = 0.05
+#: Rounds that find the nearest points of two outlines, each on intervals an eighth as long.
+ROUNDS = 12
+
+
+def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """(K, 2) um, the points of all outlines, those of a weld once, and the numbers (M,) of each
+    outline's points among them."""
+    numbers: dict[tuple[float, ...], int] = {}
+    own = [np.array([numbers.setdefault(tuple(point), len(numbers))
+                     for point in outline.points.tolist()]) for outline in outlines]
+    return np.array(list(numbers)), own
+
+
+def united(outlines: Sequence[Outline],
+           own: Sequence[np.ndarray]) -> tuple[list[Outline], list[np.ndarray]]:
+    """The outlines with one in place of two that are welded: that around both. own: as
+    :func:`shared_points` gives it. Raises MeshError if two aggregates share more than one chain of
+    nodes."""
+    if len(outlines) != 2 or not np.isin(own[0], own[1]).any():
+        return list(outlines), list(own)
+    first, second = outlines
+    weld = np.isin(own[0], own[1])
+    starts = np.flatnonzero(weld & ~np.roll(weld, 1))
+    if len(starts) != 1:
+        raise MeshError("two aggregates touch in two places; they may join in one")
+    size = int(weld.sum())
+    around = (starts[0] + size - 1 + np.arange(len(weld) - size + 2)) % len(weld)
+    of_second = np.isin(own[1], own[0])
+    begin = int(np.flatnonzero(of_second & ~np.roll(of_second, 1))[0]) + size
+    beyond = (begin + np.arange(len(of_second) - size)) % len(of_second)
+    wall = np.concatenate([first.wall[around], second.wall[beyond]])
+    both = Outline(np.concatenate([first.points[around], second.points[beyond]]),
+                   np.where(wall == WELD, FREE, wall),
+                   np.concatenate([first.fixed[around], second.fixed[beyond]]),
+                   np.concatenate([first.origin[around], second.origin[beyond]]),
+                   first.geometry, first.seat)
+    return [both], [np.concatenate([own[0][around], own[1][beyond]])]
+
+
+def ends_of(outline: Outline) -> tuple[int, int]:
+    """The first and the last node of an outline's weld, along its loop."""
+    weld = outline.wall == WELD
+    first = np.flatnonzero(weld & ~np.roll(weld, 1))[0]
+    last = np.flatnonzero(weld & ~np.roll(weld, -1))[0]
+    return int(first), int(last)
+
+
+def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For both ends of a weld, the nodes (k,) of either outline from the line on, as far as both
+    are free; the line comes first."""
+    start, end = ends_of(first)
+    begin, last = ends_of(second)
+    return [(_free_from(first, end, 1), _free_from(second, begin, -1)),
+            (_free_from(first, start, -1), _free_from(second, last, 1))]
+
+
+def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
+    """Nodes from one on, in a direction along the loop, as far as they are free, to a corner."""
+    count = len(outline.points)
+    walk = (node + direction * np.arange(count)) % count
+    free = 1 + int(np.flatnonzero(outline.wall[walk[1:]] != FREE)[0])
+    return walk[: free - (free - 1) % outline.geometry]
+
+
+def lengths_from(outline: Outline, walk: np.ndarray) -> np.ndarray:
+    """(c,) um along the surface from the first of the nodes ``walk`` to each of its corners."""
+    return _lengths(outline, walk)[::ON_ARC]
+
+
+def _lengths(outline: Outline, walk: np.ndarray) -> np.ndarray:
+    """(p,) um along the surface from the first of the nodes ``walk`` to points on its arcs: to
+    ON_ARC of each, the last of them its end."""
+    nodes = outline.points[walk]
+    arcs = np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1)
+    points = np.einsum("ta,kai->kti", parabola(np.linspace(0, 1, ON_ARC + 1)), arcs)
+    pieces = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    return np.concatenate([[0.0], np.cumsum(pieces)])
+
+
+def opposite(one: np.ndarray, other: np.ndarray, part: float = OPPOSITE) -> np.ndarray:
+    """(c, d) True where a corner at a length (c,) um from the line is opposite one at (d,) um.
+
+    part: like OPPOSITE.
+    """
+    apart = np.abs(one[:, None] - other)
+    return apart <= part * np.minimum(_shortest(one)[:, None], _shortest(other))
+
+
+def _shortest(lengths: np.ndarray) -> np.ndarray:
+    """(c,) um, the shorter of the edges beside each corner."""
+    edges = np.concatenate([[np.inf], np.diff(lengths), [np.inf]])
+    return np.minimum(edges[:-1], edges[1:])
+
+
+def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The same curves with opposite corners beyond a weld, close to each other at its ends."""
+    if len(outlines) != 2 or not all((outline.wall == WELD).any() for outline in outlines):
+        return list(outlines)
+    return _with_opposite(_refined(outlines, sizing), sizing.film)
+
+
+def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
+    """The same curves with opposite corners beyond a weld; film: the least one, um."""
+    cuts: tuple[list, list] = ([], [])
+    for walks in notches(*outlines):
+        lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
+        reach = _reach(outlines, walks, lengths, MATCHED_FILMS * film)
+        pairs = opposite(lengths[0], lengths[1])
+        for number, missing in enumerate([~pairs.any(axis=0), ~pairs.any(axis=1)]):
+            s = lengths[1 - number][missing]
+            s = s[(s <= reach) & (s < lengths[number][-1])]
+            cuts[number].extend(_places(outlines[number], walks[number], s))
+    return [cut(outline, places) for outline, places in zip(outlines, cuts)]
+
+
+def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The same curves with the edges beyond a weld divided into equal parts.
+
+    The parts are at most as long as ``sizing.moving_lines``, or FINEST, over the least film from
+    the line, and grow from there.
+    """
+    cuts: tuple[list, list] = ([], [])
+    line = max(sizing.moving_lines, FINEST * sizing.film)
+    for walks in notches(*outlines):
+        for outline, walk, cut_at in zip(outlines, walks, cuts):
+            lengths = lengths_from(outline, walk)
+            beyond = np.maximum(lengths[:-1] - sizing.film, 0.0)
+            size = line + sizes_of.GRADATION * beyond
+            parts = np.maximum(1, np.ceil(np.diff(lengths) / size)).astype(int)
+            for start, end, count in zip(lengths, lengths[1:], parts):
+                cut_at.extend(_places(outline, walk, np.linspace(start, end, count + 1)[1:-1]))
+    return [cut(outline, places) for outline, places in zip(outlines, cuts)]
+
+
+def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
+    """Number of corners from the line on, the line included, that are opposite each other, from the
+    lengths (um) at which they lie on both surfaces."""
+    count = min(len(one), len(two))
+    pairs = np.diagonal(opposite(one, two, STILL_OPPOSITE))[:count]
+    return count if pairs.all() else int(np.argmin(pairs))
+
+
+def _reach(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
+           lengths: Sequence[np.ndarray], thick: float) -> float:
+    """Length (um) from the line at which the film is thicker than ``thick`` (um)."""
+    one, two = (outline.points[walk[:: outline.geometry]]
+                for outline, walk in zip(outlines, walks))
+    beside = np.column_stack([np.interp(lengths[0], lengths[1], two[:, axis]) for axis in (0, 1)])
+    apart = np.linalg.norm(one - beside, axis=1)
+    wide = (apart > thick) | (lengths[0] > lengths[1][-1])
+    return float(lengths[0][np.argmax(wide)] if wide.any() else lengths[0][-1])
+
+
+def _places(outline: Outline, walk: np.ndarray, s: np.ndarray) -> list[tuple[int, float]]:
+    """(arc, t) of the points at lengths s (um) from the first of the nodes ``walk``."""
+    lengths = _lengths(outline, walk)
+    corners = walk[::2] // 2
+    arcs = len(outline.points) // 2
+    forward = (corners[1] - corners[0]) % arcs == 1
+    places = np.interp(s, lengths, np.arange(len(lengths)) / ON_ARC)
+    t, k = np.modf(places)
+    return [(int(corners[each]), part) if forward else (int(corners[each] - 1) % arcs, 1 - part)
+            for each, part in zip(k.astype(int), t.tolist())]
+
+
+def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
+    """The same curve with further corners at t in (0, 1) of edges."""
+    if not places:
+        return outline
+    edges = len(outline.points) // outline.geometry
+    at: list[list[float]] = [[0.0] for _ in range(edges)]
+    for edge, t in sorted(places):
+        at[edge].append(t)
+    parts = [np.array(each) for each in at]
+    if outline.geometry == 2:
+        parts = [np.column_stack([t, (t + np.append(t[1:], 1.0)) / 2]).ravel() for t in parts]
+    every = np.repeat(np.arange(edges), [len(t) for t in parts])
+    return placed(outline, every, np.concatenate(parts))
+
+
+def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
+    """The same curves with a corner of each at the point nearest to the other, marked as a weld,
+    and corners at the length ``reach`` (um) on both sides of it."""
+    outlines = []
+    for outline, (edge, t) in zip((first, second), _nearest(first, second)):
+        edges = len(outline.points) // outline.geometry
+        node = outline.geometry * ((edge + round(t)) % edges)
+        if AT_CORNER < t < 1 - AT_CORNER:
+            outline = cut(outline, [(edge, t)])
+            node = outline.geometry * (edge + 1)
+        wall = outline.wall.copy()
+        wall[node] = WELD
+        outline = replace(outline, wall=wall)
+        sides = [_free_from(outline, node, direction) for direction in (1, -1)]
+        outlines.append(cut(outline, [place for walk in sides
+                                      for place in _places(outline, walk, np.array([reach]))]))
+    return outlines
+
+
+def _nearest(first: Outline, second: Outline) -> list[tuple[int, float]]:
+    """(edge, t) of the nearest points of two outlines."""
+    arcs = [outline.arcs(outline.points) for outline in (first, second)]
+    t = np.linspace(0, 1, 17)
+    one, two = (np.einsum("ta,kai->kti", parabola(t), each).reshape(-1, 2) for each in arcs)
+    apart = np.linalg.norm(one[:, None] - two, axis=2)
+    numbers = [int(number) for number in np.unravel_index(np.argmin(apart), apart.shape)]
+    edges = [number // len(t) for number in numbers]
+    middle = np.array([t[number % len(t)] for number in numbers])
+    width = 1 / 16
+    for _ in range(ROUNDS):
+        trials = np.clip(middle[:, None] + width * np.linspace(-1, 1, 17), 0, 1)
+        one, two = (parabola(trial) @ each[edge]
+                    for trial, each, edge in zip(trials, arcs, edges))
+        apart = np.linalg.norm(one[:, None] - two, axis=2)
+        place = np.unravel_index(np.argmin(apart), apart.shape)
+        middle = trials[[0, 1], place]
+        width /= 4
+    return [(edge, float(part)) for edge, part in zip(edges, middle)]

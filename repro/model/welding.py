@@ -1,0 +1,292 @@
+"""Two aggregates that meet and weld: their surfaces join, and share their motion from then on.
+
+The welded aggregates are one elastic body with two references. They share the displacements and the
+pressure of the nodes of the weld, and each triangle keeps the reference and the theta of its own
+aggregate, so that both keep the strain that they had when they joined. A film between them closes
+as one at a wall does (2.3.3): it must be as thick as the least film, or as tan(angle) times the
+distance along its middle line from the line, whichever is less. Pairs of opposite nodes
+(:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. They go half of the
+way each, and then to equilibrium. Contact lines on walls advance by nodes, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from repro.errors import GrowthError, LinearError
+from repro.fem import welds
+from repro.fem.forms import Basis, basis
+from repro.fem.walls import FREE, WELD
+from repro.model import growth, remeshing
+from repro.model.closing_by_nodes import closing_nodes
+from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF
+from repro.model.mechanics import (
+    CONTACT_ROUNDS,
+    Expansion,
+    Mechanics,
+    constraints,
+    surface_supports,
+    with_new_surfaces,
+)
+from repro.model.pore import Pore
+from repro.model.remeshing import Remeshing
+from repro.model.solid import Shape, Solid
+from repro.model.support import Support
+
+
+@dataclass(frozen=True, eq=False)
+class WeldedSolid(Solid):
+    """Welded aggregates; in_triangles: (t, k, 2) um, the reference of each triangle's nodes."""
+
+    in_triangles: np.ndarray = field(kw_only=True)
+
+    @cached_property
+    def at(self) -> Basis:
+        """The displacements' functions in the references."""
+        return basis(self.shape.cells, len(self.reference), self.in_triangles, self.shape.table)
+
+
+def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float) -> Pore:
+    """The pore after two aggregates have met: they are welded over the least film's length on both
+    sides of the point where they are nearest. speed: as for :func:`remeshing.remesh`."""
+    film = mechanics.keys.minimum_film
+    first, second = pore.outlines
+    outlines = welds.facing(first, second, film)
+    facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
+    shape = Welding(mechanics, facing, facing, reach=film).close()
+    return remeshing.remesh(rules, facing, shape.pore, speed)[0]
+
+
+@dataclass(eq=False)
+class Notch:
+    """The water at one end of a weld.
+
+    pairs: (k, 2) nodes of the mesh that are opposite each other, from the line on; before:
+    (k, 2, 2) um, their places in the old shape; size: nodes from corner to corner; film, slope: the
+    least film (um) and the tangent of the least angle; joined: number of corners beyond the old
+    line that have joined; few, enough: largest number with which a film is too thin, and smallest
+    one with which none is; step: corners by which the next trial goes farther.
+    """
+
+    pairs: np.ndarray
+    before: np.ndarray
+    size: int
+    film: float
+    slope: float
+    joined: int = 0
+    enough: float = inf
+    step: int = 1
+
+    def __post_init__(self) -> None:
+        self.few = self.joined - 1
+
+    @property
+    def tied(self) -> np.ndarray:
+        """(k, 2) pairs that have joined."""
+        return self.pairs[: self.size * self.joined + 1]
+
+    def advance(self, points: np.ndarray) -> None:
+        """Go to the next trial, with the nodes at places (N, 2) um: the search doubles its steps
+        until no film is too thin, and then halves the interval."""
+        if not self._too_thin(points):
+            self.enough = self.joined
+        else:
+            self.few = self.joined
+            if self.enough <= self.joined:  # the other notch has moved since
+                self.enough, self.step = inf, 1
+        if self.enough < inf:
+            self.joined = int(self.few + self.enough + 1) // 2
+            return
+        last = (len(self.pairs) - 1) // self.size - 1
+        if self.few >= last:
+            raise GrowthError("the weld advances beyond the nodes that are opposite each other")
+        self.joined = min(self.few + self.step, last)
+        self.step *= 2
+
+    def _too_thin(self, points: np.ndarray) -> bool:
+        """Is a film thinner than the rule asks for? Close to the line less is asked for, as in
+        :mod:`repro.model.contact_lines`."""
+        free = self.pairs[self.size * self.joined:]
+        one, two = _along_arcs(points[free])
+        before = _along_arcs(self.before[self.size * self.joined:])
+        along = np.cumsum(np.linalg.norm(np.diff(0.5 * (one + two), axis=0), axis=1))
+        tangent = np.gradient(before.mean(axis=0), axis=0)
+        normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        across = np.einsum("ki,ki->k", normal, before[1] - before[0])
+        normal *= np.sign(across[np.argmax(np.abs(across))])
+        gap = np.einsum("ki,ki->k", normal, two - one)[1:]
+        needs = np.minimum(self.film, self.slope * along)
+        needs[along < ANGLE_FROM * (1 - ROUND_OFF) * self.film / self.slope] *= PART_OF_ANGLE
+        return bool((gap < needs).any())
+
+
+def _along_arcs(nodes: np.ndarray) -> np.ndarray:
+    """(2, p, 2) um, points along the arcs of both surfaces, from their nodes (k, 2, 2); the first
+    node, then PLACES of each arc."""
+    arcs = np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1)
+    points = np.einsum("ta,kasi->skti", AT_PLACES[1:], arcs).reshape(2, -1, 2)
+    return np.concatenate([nodes[None, 0].swapaxes(0, 1), points], axis=1)
+
+
+@dataclass(eq=False)
+class Welding:
+    """Closing of the film between two aggregates that are welded, or that have met.
+
+    grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
+    shape and pressure from which the search starts; forces: (n, 2) um on the nodes of all
+    aggregates, over mu_L; reach: um, length on both sides of the point of the first contact that
+    joins, zero with a weld; patient: as in :class:`SearchOptions`.
+    """
+
+    mechanics: Mechanics
+    grown: Pore
+    start: Pore
+    forces: np.ndarray | None = None
+    reach: float = 0.0
+    patient: bool = True
+
+    def __post_init__(self) -> None:
+        self._iterations = 0
+        self._notches = [self._notch(walks) for walks in welds.notches(*self.grown.outlines)]
+
+    def _notch(self, walks: Sequence[np.ndarray]) -> Notch:
+        """The notch whose nodes on both outlines are ``walks``."""
+        mesh = self.grown.mesh
+        keys = self.mechanics.keys
+        size = mesh.geometry
+        lengths = [welds.lengths_from(*each) for each in zip(self.grown.outlines, walks)]
+        nodes = size * (welds.opposite_corners(*lengths) - 1) + 1
+        pairs = np.column_stack([loop[walk[:nodes]]
+                                 for loop, walk in zip(mesh.topology.loops, walks)])
+        return Notch(pairs, mesh.points[pairs], size, keys.minimum_film,
+                     np.tan(keys.minimum_contact_angle),
+                     int(np.abs(lengths[0] - self.reach).argmin()))
+
+    def equilibrium(self) -> Pore:
+        """The equilibrium with the weld and the contact of the start."""
+        return self._equilibrium(self.start, self._tied())
+
+    def close(self) -> Expansion:
+        """The shape in which no film between the aggregates and no wedge at a wall is too thin.
+
+        Raises GrowthError.
+        """
+        shape = replace(self.grown, space=self.start.space, pressure=self.start.pressure)
+        tied = np.empty((0, 2), int) if self.reach else self._tied()
+        for _ in range(CONTACT_ROUNDS):
+            shape = self._joined(shape, tied)
+            tied = self._tied()
+            marked = self._marked(shape)
+            for notch in self._notches:
+                notch.advance(shape.mesh.points)
+            walls = [self._closing(shape, number) for number in range(2)]
+            at_rest = np.array_equal(self._tied(), tied)
+            if at_rest and not any((wall != FREE).any() for wall in walls):
+                return Expansion(marked, self._iterations)
+            shape = replace(shape, bodies=tuple(
+                replace(body, wall=np.where(wall != FREE, wall, body.wall))
+                for wall, body in zip(walls, shape.bodies)))
+        raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
+
+    def _tied(self) -> np.ndarray:
+        """(k, 2) nodes of the pairs that have joined."""
+        return np.concatenate([notch.tied for notch in self._notches])
+
+    def _joined(self, shape: Pore, tied: np.ndarray) -> Pore:
+        """The equilibrium after further pairs have joined half way between their nodes.
+
+        tied: (k, 2) pairs that have joined before. If the triangles beside the others are too
+        small for this, their aggregates first take the equilibrium with them at these places.
+        """
+        pairs = self._tied()
+        if not np.isin(pairs[:, 1], tied[:, 1]).all():
+            points = shape.mesh.points.copy()
+            points[pairs] = points[pairs].mean(axis=1)[:, None]
+            with suppress(GrowthError, LinearError):
+                return self._equilibrium(shape.moved(points), pairs)
+            shape = self._equilibrium(shape, tied[np.isin(tied[:, 1], pairs[:, 1])], pairs)
+        return self._equilibrium(shape, pairs)
+
+    def _equilibrium(self, shape: Pore, tied: np.ndarray,
+                     placed: np.ndarray | None = None) -> Pore:
+        """The equilibrium with pairs (k, 2) that are tied, and others, ``placed``, half way between
+        their nodes."""
+        grown = self.grown
+        mesh = grown.mesh
+        alias = np.arange(len(mesh.points))
+        alias[tied[:, 1]] = tied[:, 0]
+        cells = alias[mesh.cells[mesh.biomass]]
+        nodes, own_cells = np.unique(cells, return_inverse=True)
+        number = np.searchsorted(nodes, alias)
+        corners = int(np.count_nonzero(nodes < mesh.corners))
+        prescribed = np.zeros((len(mesh.points), 2), bool)
+        target = shape.mesh.points.copy()
+        reference = mesh.points.copy()
+        in_triangles, thetas = [], []
+        supports: list[Support] = []
+        for k, region in enumerate(mesh.regions):
+            solid, theta = grown.bodies[k].strained
+            in_triangles.append(solid.reference[region.own_cells])
+            thetas.append(theta)
+            reference[region.nodes] = solid.reference
+            seen = shape.focused(k)
+            locked, places = constraints(grown.focused(k), seen)
+            prescribed[region.nodes] |= locked
+            target[region.nodes] = np.where(locked, places, target[region.nodes])
+            for support in surface_supports(solid, seen):
+                load = np.zeros(len(nodes))
+                np.add.at(load, number[region.nodes], support.load)
+                supports.append(Support(int(number[region.nodes[support.point]]), load))
+        if placed is not None:
+            prescribed[placed] = True
+            target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
+        solid = WeldedSolid(
+            Shape(own_cells.reshape(cells.shape), corners, grown.space.gradient_degree,
+                  mesh.topology.method), reference[nodes], energy=grown.bodies[0].solid.energy,
+            in_triangles=mesh.by_triangle(in_triangles))
+        forces = None
+        if self.forces is not None:
+            forces = np.zeros((len(nodes), 2))
+            np.add.at(forces, number[mesh.body], self.forces)
+        rest = growth.equilibrium(
+            solid, mesh.by_triangle(thetas), shape.mesh.points[nodes],
+            shape.pressure[nodes[:corners]], prescribed[nodes], target[nodes], forces=forces,
+            supports=supports,
+            modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
+        self._iterations += rest.iterations
+        points = shape.mesh.points.copy()
+        points[mesh.body] = rest.position[number[mesh.body]]
+        pressure = shape.pressure.copy()
+        body_corners = mesh.topology.body_corners
+        pressure[body_corners] = rest.pressure[number[body_corners]]
+        return replace(shape.moved(points), pressure=pressure)
+
+    def _closing(self, shape: Pore, number: int) -> np.ndarray:
+        """(M,) wall that each node of an aggregate must join next, or FREE; whole arcs join."""
+        seen = shape.focused(number)
+        outline = seen.boundary
+        keys = self.mechanics.keys
+        wall = closing_nodes(outline, seen.walls, keys.minimum_film, keys.minimum_contact_angle)
+        if outline.geometry == 2:
+            middles = wall[1::2]
+            before = np.where(middles != FREE, middles, wall[::2])
+            wall[::2] = np.where(before != FREE, before, np.roll(middles, 1))
+        return wall
+
+    def _marked(self, shape: Pore) -> Pore:
+        """The pore with the nodes that have joined marked as welded."""
+        pairs = self._tied()
+        bodies = [replace(body, wall=np.where(np.isin(loop, pairs[:, number]), WELD, body.wall))
+                  for number, (body, loop) in enumerate(zip(shape.bodies,
+                                                            shape.mesh.topology.loops))]
+        marked = replace(shape, bodies=tuple(bodies))
+        for number in range(2):
+            marked = with_new_surfaces(marked.focused(number))
+        return marked.focused(None)
