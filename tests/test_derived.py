@@ -196,7 +196,7 @@ def derived_row(scene, instant):
     body = pore.mesh.cells[pore.mesh.biomass]
     derived["aggregate_area_um2"] = (np.linalg.det(jacobians(pore.mesh.points, body, at_points)) @ weights).sum()
     derived |= {"thickness_um": y.max(), "upstream_um": x.min(), "downstream_um": x.max()}
-    density = (pore.active + pore.inert) / areas_at_points(pore) / scene.kinetics.maximum_density
+    density = (pore.active + pore.inert).sum(1) / areas_at_points(pore).sum(1) / scene.kinetics.maximum_density
     derived |= {"inert_fraction": pore.inert.sum() / (pore.active.sum() + pore.inert.sum()),
               "biomass_density_min": density.min(), "biomass_density_max": density.max(),
               "biomass_balance": 0.0, "oxygen_demand_balance": 0.0}

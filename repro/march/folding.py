@@ -93,7 +93,7 @@ def fold_message(when: str, compression: Compression) -> str:
 
 
 def refuse_density(previous: Pore, pore: Pore, maximum_density: float) -> None:
-    """Raise GrowthError if the density at a node is out of bounds: J = theta does not hold.
+    """Raise GrowthError if the density is out of bounds: J = theta does not hold.
 
     previous: the pore before the step. On a new mesh the step has no equilibrium yet, and J is
     rough where strain is singular, so densities are judged only if the step keeps the mesh.

@@ -130,10 +130,12 @@ class Pore:
         return replace(self, space=Space(self.mesh.moved(points)))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
-        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m. The
-        constraint J = theta keeps both near one."""
+        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m: means over
+        curved triangles, or values at the nodes of straight ones. The constraint J = theta keeps
+        both near one; at single points of a curved triangle it does not."""
         inert = self.inert
-        density = (self.active + inert) / self.space.reaction.dx / maximum_density
+        area = self.space.reaction.dx.sum(axis=1)
+        density = (self.active + inert).sum(axis=1) / area / maximum_density
         return float(inert.sum() / self.mass), float(density.min()), float(density.max())
 
     def focused(self, number: int | None) -> Pore:
