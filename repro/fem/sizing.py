@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, WELD, Walls, numbered, whole_width, width_between
+from repro.fem.walls import FREE, WELD, Walls, numbered, touches_wall, whole_width, width_between
 
 #: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
 ACROSS_PORE = 14.0
@@ -127,7 +127,7 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
     """(M,) size (um) that grows from the contact lines with the opposite wall; inf without them."""
-    on = (outline.wall != FREE) & (outline.wall != WELD) & (outline.wall != outline.seat.wall)
+    on = touches_wall(outline.wall) & (outline.wall != outline.seat.wall)
     if sizing.contact == inf or not on.any():
         return inf
     lines = outline.points[on & ~(np.roll(on, 1) & np.roll(on, -1))]
@@ -175,7 +175,7 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
     that a film has elements of one size. Short interface edges are never merged, so the elements
     around them are small too.
     """
-    free = (outline.wall == FREE) | (outline.wall == WELD)
+    free = ~touches_wall(outline.wall)
     near = interface_sizes(outline, sizing)[free]
     edge = outline.edge_lengths()
     near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
@@ -304,7 +304,7 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
         ends = outline.arcs(outline.origin)[edge]
         origin = seed + _on_arc(origin - seed, ends[:, 0] - seed, ends[:, 2] - seed)
     wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
-    on = (wall != FREE) & (wall != WELD)
+    on = touches_wall(wall)
     points[on, 1] = outline.points[corner[on], 1]
     points[first] = outline.points[corner[first]]
     origin[first] = outline.origin[corner[first]]

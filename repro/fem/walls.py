@@ -104,6 +104,12 @@ def channel_walls(width: float, bonded: bool = False, upper: str = "no slip") ->
             Wall(TOP, width, -1.0, **{"bonded": bonded, **CONDITIONS[upper]}))
 
 
+def touches_wall(numbers: np.ndarray) -> np.ndarray:
+    """True where a node touches a wall, from the numbers in its outline: it is neither free nor
+    welded."""
+    return (numbers != FREE) & (numbers != WELD)
+
+
 def numbered(walls: Walls, number: int) -> Wall:
     """The wall with a number."""
     return next(wall for wall in walls if wall.number == number)

@@ -34,7 +34,7 @@ MATCHED_FILMS = 3.0
 FINEST = 0.125
 #: A point nearer to a corner than this part of an arc is that corner.
 AT_CORNER = 0.05
-#: Rounds that find the nearest points of two outlines, each on intervals an eighth as long.
+#: Rounds that find the nearest points of two outlines, each on intervals a quarter as long.
 ROUNDS = 12
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from repro.fem.division import Division
 from repro.fem.outline import Outline
 from repro.fem.refinement import Bisection
-from repro.fem.walls import FREE, WELD
+from repro.fem.walls import touches_wall
 from repro.model import growth
 from repro.model.contact_lines import Advances, SearchOptions
 from repro.model.pore import Pore
@@ -194,7 +194,7 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
     """
     prescribed = np.zeros((count, 2), bool)
     prescribed[rim[fixed], 0] = True
-    prescribed[rim[(wall != FREE) & (wall != WELD)], 1] = True
+    prescribed[rim[touches_wall(wall)], 1] = True
     return prescribed
 
 

@@ -27,9 +27,9 @@ ACCEPTED = {("accurate", "facing"): 1.7e-3, ("exact", "facing"): 4e-4}
 SHARE = 0.25
 #: Two facing aggregates and one below the plane: largest relative differences that presets aim at until the two meet.
 #: `fast` misses its aim, 0.3 %: the conductivity differs by 0.68 % and the acceptor in the effluent by 0.89 %.
-#: Elements of the half pore are half as large across it. `accurate` misses its aim, 0.05 %, since 2026-11-30, when theta
-#: is interpolated on new meshes: the acceptor in the effluent differs by 0.056 % (by 0.04 % before). The limits are what
-#: the presets promise.
+#: Elements of the half pore are half as large across it. `accurate` misses its aim, 0.05 %: the acceptor in the
+#: effluent differs by 0.056 %, and by 0.04 % until new meshes interpolated theta (2026-11-30). The limits are what the
+#: presets promise.
 MIRROR_AIMS = {"fast": 3e-3, "accurate": 5e-4}
 MIRROR_ACCEPTED = {"fast": 1e-2, "accurate": 1e-3}
 #: Width (um) of the pore with the mirror image, and times (h) of its rows.
