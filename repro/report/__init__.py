@@ -20,7 +20,7 @@ from repro.errors import OutputError
 from repro.report import comparison, run_page
 from repro.report.reading import read
 from repro.results import write_text
-from repro.results.files import atomic_path, output_path
+from repro.results.files import output_path
 from repro.scene.arguments import typed
 
 __all__ = ["compare", "write"]
@@ -32,9 +32,7 @@ def write(folder: Path) -> Path:
     Raises OutputError if the folder holds no run, or its fields cannot be read.
     """
     target = folder / "report.html"
-    text = run_page.build(read(folder))
-    with atomic_path(target) as beside:
-        write_text(beside, text)
+    write_text(target, run_page.build(read(folder)))
     return target
 
 

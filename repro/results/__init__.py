@@ -8,8 +8,8 @@
     permeability  laws for models on the Darcy scale
     drawing       curves, fields and films with matplotlib
 
-Writers use :func:`repro.results.files.atomic_path`, so that a file is complete or absent. An empty
-field of a table is a quantity that the scene does not model.
+A file that :func:`write_text` writes is complete or absent, and so are tables, lists and JSON. An
+empty field of a table is a quantity that the scene does not model.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from repro.results.columns import (
     ledger_row,
     row,
 )
-from repro.results.files import MOST_TABLE, read, sealed
+from repro.results.files import MOST_TABLE, atomic_path, read, sealed
 from repro.results.quantities import UNITS
 from repro.scene import Scene, scene_hash, scene_tables
 
@@ -49,8 +49,9 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint"
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file without changing its line ends. Bytes that are no text are escaped."""
-    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="")
+    """Write a complete text file, or none. Line ends stay; bytes that are no text are escaped."""
+    with atomic_path(path) as beside:
+        beside.write_text(text, encoding="utf-8", errors="backslashreplace", newline="")
 
 
 def write_index(path: Path, entries: list[tuple[float, str]]) -> None:
@@ -105,15 +106,8 @@ def provenance(scene: Scene) -> dict:
             "versions": versions, **scheme}
 
 
-@cache
-def version(package: str) -> str:
-    """The version of an installed package; it is read from the disk once.
-
-    The version is a line of the metadata. metadata.version() parses all of them, which takes a
-    hundred times as long.
-    """
-    text = metadata.distribution(package).read_text("METADATA") or ""
-    return text.partition("\nVersion: ")[2].partition("\n")[0]
+#: The version of an installed package; it is read from the disk once.
+version = cache(metadata.version)
 
 
 def write_json(path: Path, content: dict) -> None:

@@ -220,7 +220,9 @@ class Recorder:
 
     def save_last_state(self) -> None:
         """Save the present state as the one from which a longer run resumes."""
-        self._write(checkpoint.LAST, Path.write_bytes, self._packed())
+        path = claim(self.folder, checkpoint.LAST, self.run_files)
+        with file_errors(path), atomic_path(path) as beside:
+            beside.write_bytes(self._packed())
 
     def _packed(self) -> bytes:
         """The content of a checkpoint of the present state and history."""
@@ -249,8 +251,8 @@ class Recorder:
 
     def _write(self, name: str, write, *content) -> None:
         path = claim(self.folder, name, self.run_files)
-        with file_errors(path), atomic_path(path) as beside:
-            write(beside, *content)
+        with file_errors(path):
+            write(path, *content)
 
     def _current_history(self) -> History:
         """The history with the wall time so far, including the time before a resume."""
@@ -325,8 +327,8 @@ def complete_folder(folder: Path, record: dict, run_files: set[str]) -> None:
     with file_errors(path):
         report.write(folder)
     record = record | {"sha256": record["sha256"] | {REPORT: sha256_of(path)}}
-    with file_errors(folder / PROVENANCE), atomic_path(folder / PROVENANCE) as beside:
-        results.write_sealed(beside, record)
+    with file_errors(folder / PROVENANCE):
+        results.write_sealed(folder / PROVENANCE, record)
     if is_over(record["status"]):
         remove(folder, CHECKPOINTS)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from repro.errors import OutputError
 from repro.report.reading import read_record
 from repro.results import write_json
-from repro.results.files import atomic_path, is_folder, read_json
+from repro.results.files import is_folder, read_json
 from repro.runs.folder import LOCK, PROVENANCE, find_foreign, folder_errors, locked, refuse_null
 from repro.runs.integrity import find_defect
 from repro.sweeps import single_run
@@ -56,8 +56,7 @@ def lock_folder(sweep: Sweep):
         with folder_errors(sweep.folder):
             _check(sweep)  # again: another sweep may have begun meanwhile
             sweep.runs.mkdir(exist_ok=True)
-            with atomic_path(sweep.folder / "sweep.json") as beside:
-                write_json(beside, _as_json(sweep))
+            write_json(sweep.folder / "sweep.json", _as_json(sweep))
         yield
 
 

@@ -15,7 +15,6 @@ from repro.report import charts
 from repro.report import page as html
 from repro.report.colours import viridis
 from repro.results import write_text
-from repro.results.files import atomic_path
 from repro.results.names import ANSWER, KNOWN
 from repro.sweeps.design import Factor, label
 from repro.sweeps.folder import Sweep
@@ -34,8 +33,7 @@ TABLE_NUMBERS = (*"""end_h clogging_time_h clogging_biomass contact_time_h conta
 
 def write(sweep: Sweep, runs: list[SweepRun], clogged: float) -> None:
     """Write ``summary.html``."""
-    with atomic_path(sweep.folder / "summary.html") as beside:
-        write_text(beside, page(sweep, runs, clogged))
+    write_text(sweep.folder / "summary.html", page(sweep, runs, clogged))
 
 
 def page(sweep: Sweep, runs: list[SweepRun], clogged: float) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from repro import results
 from repro.errors import OutputError
-from repro.results.files import atomic_path, is_file
+from repro.results.files import is_file
 from repro.results.quantities import Quantity, none_if_nan
 from repro.runs import status
 from repro.runs.integrity import read_scene_run
@@ -197,12 +197,10 @@ def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
 def write(sweep: Sweep, runs: list[SweepRun]) -> None:
     """Write ``table.csv`` and ``runs.csv``."""
     varied = [factor.column for factor in sweep.factors]
-    with atomic_path(sweep.folder / "table.csv") as beside:
-        results.write_table(beside, ["run", *varied, *series_columns(sweep.points)],
-                            _rows(sweep, runs))
+    results.write_table(sweep.folder / "table.csv",
+                        ["run", *varied, *series_columns(sweep.points)], _rows(sweep, runs))
     columns = run_columns(sweep.factors, runs)
-    with atomic_path(sweep.folder / "runs.csv") as beside:
-        results.write_table(beside, list(columns), zip(*columns.values()))
+    results.write_table(sweep.folder / "runs.csv", list(columns), zip(*columns.values()))
 
 
 def run_columns(factors: Sequence[Factor], runs: Sequence[SweepRun]) -> dict[str, list]:
