@@ -29,38 +29,20 @@ class Unit(NamedTuple):
         return Unit(self.size * other.size, *(a + b for a, b in zip(self[1:], other[1:])))
 
 
-def _prefixed(names: str, unit: Unit) -> dict[str, Unit]:
-    """Every name with every prefix."""
-    return {prefix + name: unit._replace(size=unit.size * Fraction(10) ** power)
-            for name in names.split() for prefix, power in PREFIXES.items()}
-
-
-def _plain(names: str, unit: Unit) -> dict[str, Unit]:
-    return dict.fromkeys(names.split(), unit)
-
-
-METER = Unit(Fraction(1), length=1)
-GRAM = Unit(Fraction(1, 1000), mass=1)
 SECOND = Unit(Fraction(1), time=1)
-LITER = Unit(Fraction(1, 1000), length=3)
-PASCAL = Unit(Fraction(1), length=-1, mass=1, time=-2)
-DAY = SECOND._replace(size=Fraction(86_400))
+#: Units that take prefixes.
+PREFIXED = {"m": Unit(Fraction(1), length=1), "g": Unit(Fraction(1, 1000), mass=1), "s": SECOND,
+            "L": Unit(Fraction(1, 1000), length=3), "l": Unit(Fraction(1, 1000), length=3),
+            "Pa": Unit(Fraction(1), -1, 1, -2)}
+#: Other units, each with its names.
+NAMED = {"min minute minutes": SECOND._replace(size=Fraction(60)),
+         "h hr hour hours": SECOND._replace(size=Fraction(3600)),
+         "d day days": SECOND._replace(size=Fraction(86_400)),
+         "rad radian radians": Unit(Fraction(1)), "deg degree degrees": Unit(PI / 180)}
 #: Every known spelling.
-UNITS: dict[str, Unit] = {
-    **_prefixed("m", METER),
-    **_plain("micron microns", METER._replace(size=Fraction(1, 10**6))),
-    **_prefixed("g", GRAM),
-    **_prefixed("L l", LITER),
-    **_prefixed("s", SECOND),
-    **_plain("min minute minutes", SECOND._replace(size=Fraction(60))),
-    **_plain("h hr hour hours", SECOND._replace(size=Fraction(3600))),
-    **_plain("d day days", DAY),
-    **_prefixed("Pa", PASCAL),
-    **_plain("bar", PASCAL._replace(size=Fraction(100_000))),
-    **_plain("mbar", PASCAL._replace(size=Fraction(100))),
-    **_plain("rad radian radians", Unit(Fraction(1))),
-    **_plain("deg degree degrees", Unit(PI / 180)),
-}
+UNITS = {prefix + name: unit._replace(size=unit.size * Fraction(10) ** power)
+         for name, unit in PREFIXED.items() for prefix, power in PREFIXES.items()}
+UNITS |= {name: unit for names, unit in NAMED.items() for name in names.split()}
 
 
 def conversion(from_unit: str, unit: str) -> Fraction | None:

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from repro.scene import bodies
 from repro.scene.arguments import Overrides, typed
-from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
+from repro.scene.files import key_of, leave_out, override, read_tables
 from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
@@ -36,7 +36,6 @@ from repro.scene.units import (
     NON_NEGATIVE,
     NOT_IN_PAPER,
     PORE_WIDTH,
-    POSITIVE_FRACTION,
     UP_TO_1,
     UP_TO_20,
     WORD,
@@ -58,9 +57,6 @@ from repro.scene.units import (
     units_of,
 )
 from repro.schemes import CURVED, PAPER, PRINTED, Scheme
-
-__all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
-           "scene_tables"]
 
 SEED_RADIUS = 5.0  # um, Table 1
 STEADY = "0.001 1/h"
@@ -285,7 +281,7 @@ class Kinetics:
         "9.3 1/day", "1/h", NON_NEGATIVE, source="(7)-(9), Table 1",
         about="k, mg of donor per mg of active biomass and time")
     yield_coefficient: float = number(
-        0.61, POSITIVE_FRACTION, about="Y, mg of biomass per mg of donor", source="(9), Table 1")
+        0.61, UP_TO_1, about="Y, mg of biomass per mg of donor", source="(9), Table 1")
     decay_coefficient: float = quantity(
         "0.12 1/day", "1/h", NON_NEGATIVE, about="b, decay of active biomass",
         source="(9)-(10), Table 1")

@@ -74,7 +74,6 @@ class Range(NamedTuple):
 POSITIVE = Range("greater than zero", lambda value: value > 0)
 NON_NEGATIVE = Range("zero or more", lambda value: value >= 0)
 FRACTION = Range("from 0 to 1", lambda value: 0 <= value <= 1)
-POSITIVE_FRACTION = Range("greater than 0, at most 1", lambda value: 0 < value <= 1)
 BELOW_1 = Range("zero or more, less than 1", lambda value: 0 <= value < 1)
 UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
 FROM_0_TO_100 = Range("from 0 to 100", lambda value: 0 <= value <= 100)
