@@ -74,7 +74,7 @@ def test_the_page_begins_with_the_answer(fast, flow_only):
     for out in (fast, flow_only):
         text = text_of(out)
         places = [text.index(words) for words in ('class="status"', 'class="answer"', "<table>", 'class="outlines"',
-                                                  "Modelled: ", "Fields and mesh")]
+                                                  "Modelled, ", "Fields and mesh")]
         assert places == sorted(places)
         assert html.escape(answer.sentence(read(out))) in text
 

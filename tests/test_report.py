@@ -13,13 +13,13 @@ import shapely
 
 from repro import report, results
 from repro.model import growth
+from repro.preflight.modelled import describe_model
 from repro.report import comparison, fields, quantities, run_page
 from repro.report.reading import Run, read
 from repro.results import field_files, names
 from repro.results.arrays import ARRAYS
 from repro.results.field_files import Grid
 from repro.results.quantities import ending
-from repro.scene import load_scene, scene_tables
 from tests.pages import (
     FAST,
     HOSTILE,
@@ -71,28 +71,18 @@ def test_numbers_are_those_of_the_first_and_the_last_row(request, name):
 def test_the_page_leaves_out_physics_that_is_not_modelled(flow_only, fast):
     """Assumptions about the modelled physics stand before fields and charts."""
     text, packed = text_of(flow_only), page_data(flow_only)
-    assert "Not modelled: substrates, kinetics, growth." in text and "acceptor" not in text.split("<script>")[0]
+    assert "no growth: only the state at t = 0" in text and "acceptor" not in text.split("<script>")[0]
     assert [(field["name"], field["unit"]) for field in packed["fields"]] == [
         ("velocity_m_per_d", "m/day"), ("head_cm", "cm"), ("region", "")]
     assert "data-chart" not in text.split("<script")[0]
-    assert '<div class="time" hidden>' in text and "Assumed: a pore in the plane" in text
+    assert '<div class="time" hidden>' in text
     page_of_growth = text_of(fast)
-    assert "Not modelled" not in page_of_growth and '<div class="time">' in page_of_growth
-    head = page_of_growth[page_of_growth.index("Assumed: "): page_of_growth.index("Fields and mesh")]
-    for words in ("traction on the aggregate neglected", "quasi-steady"):
+    assert "no growth" not in page_of_growth and '<div class="time">' in page_of_growth
+    head = page_of_growth[page_of_growth.index("Modelled, by"): page_of_growth.index("Fields and mesh")]
+    for section, words in describe_model(read(fast).scene):
+        assert f"<li><b>{section}</b>: {html.escape(words)}</li>" in head
+    for words in ("fluid forces neglected", "steady in each shape"):
         assert words in head and words not in text
-
-
-STRENGTHS = ["growth.bonding_strength=2 kPa", "growth.tensile_strength=2 kPa"]
-
-
-@pytest.mark.parametrize("changes, present, absent", [
-    (["numerics.extent=full"], ["substrates at rest", "no detachment"], ["a clean channel outside", "detaches or"]),
-    (["numerics.transport=gear", "numerics.extent=central"], ["a clean channel outside"], ["substrates at rest"]),
-    *((changes, ["detaches or tears"], ["no detachment"]) for changes in (STRENGTHS[:1], STRENGTHS[1:], STRENGTHS))])
-def test_the_assumptions_follow_from_the_scene(changes, present, absent):
-    sentence = run_page._assumed(Run(Path(), {"tables": scene_tables(load_scene("base", changes))}, {}, {}))
-    assert [words for words in (*present, *absent) if words in sentence] == present
 
 
 @pytest.mark.parametrize("stress, shown, unit", [

@@ -13,7 +13,7 @@ from repro.errors import OutputError
 from repro.results import COLUMNS, parse_table
 from repro.results.files import MOST_TABLE, read_sealed, sha256
 from repro.results.files import read as read_file
-from repro.scene import without_former
+from repro.scene import Scene, parse_scene, without_former
 
 Content = TypeVar("Content")
 NEEDED = "the folder of a run is needed or, for a new run, another folder"
@@ -32,6 +32,12 @@ class Run:
     def times(self) -> np.ndarray:
         """(n,) times of the rows, h."""
         return self.series["time_h"]
+
+    @property
+    def scene(self) -> Scene:
+        """Its scene. Raises SceneError if this version does not accept it."""
+        return parse_scene(self.record["tables"], self.record["scene"],
+                           str(self.folder / "run.json"))
 
 
 def read(folder: Path) -> Run:

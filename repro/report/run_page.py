@@ -6,40 +6,19 @@ import html
 
 import numpy as np
 
+from repro.preflight.modelled import describe_model
 from repro.report import answer, charts, fields, page, quantities
 from repro.report.colours import viridis
 from repro.report.reading import Run
 from repro.results import names
+from repro.scene import SceneError
 
-#: The physics of each section of a scene.
-PHYSICS = {
-    "flow": "Stokes flow through pore and aggregate (2.1)",
-    "substrates": "electron acceptor and donor, or one of them (2.2)",
-    "aggregate": "one or more aggregates of biomass on the walls",
-    "kinetics": "uptake, growth and decay (2.2)",
-    "growth": "growth of the aggregate as a neo-Hookean body (2.3)",
-}
 #: Keys of ``run.json`` that have their own place in the page.
 OWN_PLACE = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
         "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
 NESTED = ("Each bar is the time within a stage. A stage includes the time of those that it calls, "
           "such as factorising and solving, so the sum of the bars exceeds the total time.")
-#: Simplifications that a scene may choose; those of [numerics] apply if the section in NEEDED is
-#: present.
-ASSUMED = {
-    ("growth", "fluid_forces", "neglected"):
-        "the fluid's traction on the aggregate neglected (2.3.3)",
-    ("growth", "new_biomass", "stressed"): "strain counted from t = 0 (2.3)",
-    ("numerics", "transport", "quasi_steady"): "substrates at rest in each shape (quasi-steady)",
-    ("numerics", "extent", "central"): "a clean channel outside of the meshed part (3.1)",
-}
-NEEDED = {"transport": "substrates", "extent": "aggregate"}
-#: The numerics in the head of the page, and the section without which they do not matter. Runs of
-#: earlier versions may have elements and time.
-NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates",
-            "time": "growth"}
-
 #: Colours of a field. Neighbours cannot be told apart.
 BANDS = 128
 
@@ -69,15 +48,13 @@ def build(run: Run) -> str:
         start = _first_shown(packed, quantities.contact(run))
         more = page.data("fields", packed | {"start": start, "colours": viridis(BANDS)})
     tables = run.record["tables"]
-    missing = [name for name in PHYSICS if name not in tables]
-    note = f'<p class="note">Not modelled: {", ".join(missing)}.</p>' if missing else ""
     scene = "".join(page.table(f"[{name}]", [], _pairs(part)) for name, part in tables.items())
     if scene:
         scene = ("<details><summary>The scene, every key</summary>"
                  f'<div class="tables">{scene}</div></details>')
     body = (_head(run) + _fields(run, packed) + drawn
             + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>'
-            + page.section("What was modelled", note, scene) + _provenance(run))
+            + page.section("What was modelled", scene) + _provenance(run))
     scripts = ["errors.js", "charts.js", *(["mesh.js", "fields.js"] if packed else [])]
     return page.page(f"{run.record['scene']}: a pore", body + more, scripts)
 
@@ -99,39 +76,17 @@ def _head(run: Run) -> str:
     items = "".join(f"<li>Warning: <b>{html.escape(warning['key'])}</b>: "
                     f"{html.escape(warning['text'])}</li>" for warning in run.record["warnings"])
     warnings = f'<ul class="warnings" aria-label="warnings">{items}</ul>' if items else ""
-    modelled = "; ".join(words for name, words in PHYSICS.items() if name in run.record["tables"])
+    try:
+        sections = describe_model(run.scene)
+    except SceneError as error:
+        sections = [("not read", str(error))]
+    modelled = "".join(f"<li><b>{section}</b>: {html.escape(words)}</li>"
+                       for section, words in sections)
     return (f"<header><h1>{html.escape(run.record['scene'])}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>'
             f"{answer.build(run)}"
             f"{warnings}"
-            f"<p>Modelled: {html.escape(modelled or 'the geometry and its mesh')}. "
-            f"{html.escape(_assumed(run))} {html.escape(_numerics(run))}</p></header>\n")
-
-
-def _assumed(run: Run) -> str:
-    """The simplifications of the scene in words."""
-    tables = run.record["tables"]
-    assumptions = [words for (part, key, value), words in ASSUMED.items()
-            if tables.get(part, {}).get(key) == value
-            and (part != "numerics" or NEEDED[key] in tables)]
-    ends = {"bonding_strength", "tensile_strength"} & tables.get("growth", {}).keys()
-    fate = "a run ends where the aggregate detaches or tears" if ends else "no detachment"
-    if tables.get("growth", {}).get("after_detachment") == "continue":
-        fate = "an aggregate that detaches leaves the pore"
-    bodies = tables.get("aggregate")
-    count = f"{len(bodies)} aggregates" if isinstance(bodies, list) else "one aggregate"
-    assumptions.insert(0, f"a pore in the plane, {count}, {fate}")
-    return f"Assumed: {'; '.join(assumptions)}."
-
-
-def _numerics(run: Run) -> str:
-    """The most important numerical choices in words."""
-    tables = run.record["tables"]
-    numerics = tables["numerics"]
-    choices = [f"{key} {page.format_value(numerics[key])}".replace("_", "-")
-               for key, part in NUMERICS.items()
-               if key in numerics and (part is None or part in tables)]
-    return f"Numerics: {', '.join(choices)}." if choices else ""
+            f"<p>Modelled, by the sections of the scene:</p><ul>{modelled}</ul></header>\n")
 
 
 def _fields(run: Run, packed: dict) -> str:

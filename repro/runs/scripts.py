@@ -20,10 +20,10 @@ from repro.results.quantities import none_if_nan
 from repro.results.tables import Results, fields_at
 from repro.runs import checkpoint, execution
 from repro.runs.execution import Watch, issue_warnings, origin_of
-from repro.runs.folder import PROVENANCE, read_sums
+from repro.runs.folder import read_sums
 from repro.runs.machine import conditions
 from repro.runs.state_arrays import unpack_state
-from repro.scene import Scene, Source, load_scene, parse_scene
+from repro.scene import Scene, Source, load_scene
 from repro.scene.arguments import Overrides, typed
 from repro.timing import progress_bar
 
@@ -192,8 +192,7 @@ def load_run(folder: str | Path) -> Results:
 
 def _rerun(run: reading.Run, time: float) -> dict[str, np.ndarray]:
     """Compute the fields at a time (h) from the last saved state before it, or from t = 0."""
-    record = run.record
-    scene = parse_scene(record["tables"], record["scene"], str(run.folder / PROVENANCE))
+    record, scene = run.record, run.scene
     current = provenance(scene)["versions"], conditions()["source"]
     if (record["versions"], record["conditions"]["source"]) != current:
         warnings.warn(f"{run.folder}: code or packages have changed since the run: the fields at "
