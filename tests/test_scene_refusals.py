@@ -71,10 +71,10 @@ REFUSED = {
         'flow.head=[["0 h", "1 cm"], ["2 h", "0 cm"]]'],
     "zero or more": ["substrates.acceptor.supply=-1 mg/L", "kinetics.maximum_utilization_rate=-1 1/day",
                      "kinetics.decay_coefficient=-1 1/day", "growth.end=-1 h"],
-    "greater than zero, at most 1": ["kinetics.yield_coefficient=0", "kinetics.yield_coefficient=1.01"],
     "from 0 to 1": ["kinetics.degradable_fraction=-0.1", "kinetics.degradable_fraction=1.1"],
     "greater than zero, at most 20": ["numerics.refinement=20.1", "numerics.refinement=1e9"],
-    "greater than zero, at most 1": [f"numerics.tolerance={value}" for value in (0, -0.5, 1.1)],
+    "greater than zero, at most 1": ["kinetics.yield_coefficient=0", "kinetics.yield_coefficient=1.01",
+                                     *(f"numerics.tolerance={value}" for value in (0, -0.5, 1.1))],
     "1e-06 h or more is needed": ["growth.time_step=9e-7 h"],
     "between 0 and 90 deg": ["growth.minimum_contact_angle=0 deg", "growth.minimum_contact_angle=90 deg"],
     # shares, and F by the oxygen demand

@@ -19,9 +19,6 @@ from repro.runs.progress import say
 if TYPE_CHECKING:
     from repro.sweeps.driver import Swept
 
-if TYPE_CHECKING:
-    pass
-
 #: Exit status if some runs have failed.
 SOME_FAILED = 3
 EPILOG = """\

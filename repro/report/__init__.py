@@ -23,8 +23,6 @@ from repro.results import write_text
 from repro.results.files import output_path
 from repro.scene.arguments import typed
 
-__all__ = ["compare", "write"]
-
 
 def write(folder: Path) -> Path:
     """Write ``report.html`` of the run in a folder; returns its path.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro.report.charts import MOST_POINTS, Chart, Line, number
+from repro.report.charts import MOST_POINTS, Chart, Line
 from repro.report.reading import Run
 from repro.results import names
 from repro.results.columns import BODY, PARTS, SUBSTRATES
@@ -158,48 +158,18 @@ def charts_of(run: Run) -> list[Chart]:
     A chart needs a quantity that changes. A quantity that is zero throughout is not drawn. A chart
     with one of several lines has its label in the title.
     """
-    drawn = []
-    for kind, lines in _split(run, constant=False):
-        one_of_several = len(lines) == 1 < len(kind.drawn)
-        (first, *_) = lines.values()
-        title = f"{kind.title}: {first.label}" if one_of_several else kind.title
-        drawn.append(kind.chart(title, [*lines.values()], contact(run)))
-    return drawn
-
-
-def constants_of(run: Run) -> list[str]:
-    """Return the quantities that the charts of a run leave out because they are constant.
-
-    A text is "words: value unit".
-    """
-    texts = []
-    for _, lines in _split(run, constant=True):
-        for name, line in lines.items():
-            symbol, factor = names.readable_unit(name, [line.values])
-            value = factor * line.values[np.isfinite(line.values)][0]
-            texts.append(f"{_named(name).words}: {number(value)} {symbol}".rstrip())
-    return texts
-
-
-def _split(run: Run, constant: bool) -> list[tuple[Kind, dict[str, Line]]]:
-    """Return the lines of each kind that are drawn, or those that are texts; kinds with any.
-
-    A line is a text if it is zero throughout, or if no line of its chart changes. Lines without a
-    finite value are neither.
-    """
     drawable = series(run) if len(run.times) > 1 else {}
-    split = []
+    drawn = []
     for kind in kinds(drawable):
-        lines = {name: _line(_named(name).label, name, drawable) for name in kind.drawn
-                 if name in drawable}
-        changing = any(not line.constant and not line.dots for line in lines.values())
-        chosen = {}
-        for name, line in lines.items():
-            is_zero = line.constant and not np.nan_to_num(line.values).any()
-            if (not changing or is_zero) == constant and not (constant and line.dots):
-                chosen[name] = line
-        split += [(kind, chosen)] if chosen else []
-    return split
+        lines = [_line(_named(name).label, name, drawable) for name in kind.drawn
+                 if name in drawable]
+        if all(line.constant or line.dots for line in lines):
+            continue
+        lines = [line for line in lines if line.dots or np.nan_to_num(line.values).any()]
+        one_of_several = len(lines) == 1 < len(kind.drawn)
+        title = f"{kind.title}: {lines[0].label}" if one_of_several else kind.title
+        drawn.append(kind.chart(title, lines, contact(run)))
+    return drawn
 
 
 def _named(name: str) -> Quantity:

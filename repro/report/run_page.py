@@ -124,19 +124,17 @@ def _charts(run: Run) -> str:
     if not drawn:
         return ""
     note = ("Point at a chart for its values, or focus it and press the arrow keys; a click or "
-            "Enter shows the fields of that time.")
+            "Enter shows the fields of that time. Numbers has what does not change.")
     if touching := quantities.contact(run):
         note += f" Dotted: contact with the opposite wall, t = {touching[0]:.6g} h."
     if len(run.times) > charts.MOST_POINTS:
         note += f" {charts.MOST_POINTS} of {len(run.times)} rows are drawn."
-    constant = quantities.constants_of(run)
-    listed = f"<p>Constant: {html.escape('; '.join(constant))}.</p>" if constant else ""
     figures = {True: "", False: ""}
     for chart in drawn:
         figures[chart.of_mesh] += charts.svg(chart)
     of_pore, of_mesh = (figures[kind] and f'<div class="charts">{figures[kind]}</div>'
                         for kind in (False, True))
-    return (page.section("Over time", f'<p class="note">{note}</p>', listed, of_pore)
+    return (page.section("Over time", f'<p class="note">{note}</p>', of_pore)
             + page.section("Of the mesh and the balances, not of the pore", of_mesh))
 
 

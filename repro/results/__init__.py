@@ -40,9 +40,6 @@ from repro.results.files import MOST_TABLE, atomic_path, read, sealed
 from repro.results.quantities import UNITS
 from repro.scene import Scene, scene_hash, scene_tables
 
-__all__ = ["COLUMNS", "LEDGER_COLUMNS", "column_names", "fields", "ledger_columns", "ledger_row",
-           "row"]
-
 #: Factor from um/h to m/d.
 M_PER_D = UNITS["_m_per_d"].factor
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
@@ -87,7 +84,7 @@ def parse_table(content: bytes) -> dict[str, np.ndarray]:
     if not text.endswith("\n"):
         raise ValueError("it is empty, or its last line is cut short")
     head, *rows = csv.reader(io.StringIO(text))
-    numbers = [[float(field or "nan") for field in row] for row in rows]
+    numbers = [[float(cell or "nan") for cell in line] for line in rows]
     columns = np.array(numbers, dtype=float).reshape(len(rows), len(head)).T
     return dict(zip(head, np.ascontiguousarray(columns)))
 

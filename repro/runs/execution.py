@@ -54,8 +54,6 @@ from repro.scene import (
 )
 from repro.scene.files import key_of, override
 
-__all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
-
 #: The state after each step and, if the step is reported, its row.
 ReportedSteps = Iterator[tuple[RestartState, Report | None]]
 #: At most this many differing keys are listed in a message.

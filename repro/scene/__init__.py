@@ -45,9 +45,3 @@ from repro.scene.keys import (
 from repro.scene.needed import MissingError, needed
 from repro.scene.time_table import TimeTables, at_largest, at_time
 from repro.scene.units import SceneError, Stated
-
-__all__ = ["FINER", "KEYS", "NOT_IN_PAPER", "PRESETS", "Acceptor", "Aggregate", "Donor", "Erosion",
-           "Flow", "Growth", "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene",
-           "SceneError", "Source", "Stated", "Substrate", "Substrates", "TimeTables", "at_largest",
-           "at_time", "label", "load_scene", "load_tables", "needed", "packaged_scenes",
-           "parse_scene", "scene_hash", "scene_tables", "without_former"]

@@ -1725,14 +1725,6 @@ MUTANTS = (
          'grid.cell_data["region"] >= 0',
          "tests/test_answer.py::test_a_side_is_an_arc_through_its_middle")),
     *changes(
-        "repro/report/quantities.py",
-        ("constant-dropped",
-         "A quantity that does not change is neither drawn nor a text.",
-         "constants_of",
-         "_split(run, constant=True)",
-         "_split(run, constant=False)",
-         "tests/test_answer.py::test_a_quantity_that_does_not_change_is_a_text")),
-    *changes(
         "repro/report/run_page.py",
         ("quadratic-note",
          "A page draws linear triangles as quadratic ones.",
