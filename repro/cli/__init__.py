@@ -5,8 +5,6 @@ standard output cannot be used; 3 if some runs of a sweep have failed; 130 if in
 terminated. A closed pipe, as after ``| head -1``, is not a failure.
 """
 
-from __future__ import annotations
-
 import argparse
 import shlex
 import sys

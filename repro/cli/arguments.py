@@ -1,7 +1,5 @@
 """The arguments that choose a scene and change its keys."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from pathlib import Path

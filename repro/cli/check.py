@@ -4,8 +4,6 @@
 ``repro check FOLDER`` checks whether the run in a folder is complete and unchanged.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``repro compare RUN RUN ... --out FILE.html``: compare runs in one page."""
 
-from __future__ import annotations
-
 from repro.cli.arguments import path
 from repro.errors import printable
 from repro.runs.progress import say

@@ -3,8 +3,6 @@
 Without a page, list them.
 """
 
-from __future__ import annotations
-
 import re
 from importlib.resources import files
 

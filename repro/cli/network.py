@@ -1,7 +1,5 @@
 """``repro network-law SCENE``: the laws for networks with a scene's own kinetics, computed once."""
 
-from __future__ import annotations
-
 import sys
 
 from repro.cli.arguments import add_scene

@@ -1,7 +1,5 @@
 """``repro permeability FOLDER [--out FILE]``: K / K0 of a run or a sweep for the Darcy scale."""
 
-from __future__ import annotations
-
 from repro.cli.arguments import path
 from repro.errors import OutputError, printable
 from repro.runs.progress import say

@@ -3,8 +3,6 @@
 Without a quantity and a file, list what can be drawn.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 from repro.cli.arguments import path

@@ -3,8 +3,6 @@
 Without a scene, list the packaged ones.
 """
 
-from __future__ import annotations
-
 from repro.cli.arguments import add_changes
 from repro.runs.progress import say
 from repro.scene.text import scene_text, titles

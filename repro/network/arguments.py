@@ -1,7 +1,5 @@
 """Check of the arguments of the laws for networks."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -10,8 +10,6 @@ states depend on: the scene, the code and the versions of the packages. A file t
 that another version wrote, is made again.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import warnings

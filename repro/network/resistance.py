@@ -16,8 +16,6 @@ to 6 m/d and W^2 / 2500 to 20 mg/L of both substrates. Drawn shapes are 1 % thin
 than a half-disc, or lean by 5 %.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The public laws for networks: of Table 1's kinetics, or of those of a scene."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Check a scene before it is run: model, first mesh, numbers, simplifications, cost, outlook."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass

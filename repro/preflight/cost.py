@@ -8,8 +8,6 @@ ones they cost with new and larger meshes and in contact. The estimated memory i
 must be free when a run begins.
 """
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace

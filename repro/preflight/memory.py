@@ -10,8 +10,6 @@ an outline the second term is a sum over pieces of its edges, each with its own 
 within a factor of two.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable, Iterator

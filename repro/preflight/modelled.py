@@ -1,7 +1,5 @@
 """Describe the model of a scene in words, section by section, with the paper's equations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from repro.march.simulation import row_times

@@ -1,7 +1,5 @@
 """Run a scene coarsely, with the preset ``sketch``, for a few seconds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter

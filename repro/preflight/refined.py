@@ -5,8 +5,6 @@ elements and steps are divided. A key of [numerics] that is already as fine as t
 refined by the same factor.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -1,7 +1,5 @@
 """Check whether the flow around a drawn outline is resolved, by its head loss on finer meshes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Thresholds beyond which a simplification of a scene does not hold, each with its reason."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

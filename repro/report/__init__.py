@@ -11,8 +11,6 @@
     *.css, *.js   its style and scripts, which draw fields as SVG
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

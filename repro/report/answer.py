@@ -1,7 +1,5 @@
 """The beginning of the page of a run: its answer in words, a small table and a picture."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np

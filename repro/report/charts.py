@@ -5,8 +5,6 @@
 ``line0`` ... ``line7``); ``data-chart`` has the numbers for the pointer.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The colours of values on pages: viridis, which the colour-blind can distinguish."""
 
-from __future__ import annotations
-
 import numpy as np
 
 #: Red, green and blue of viridis at evenly spaced places. Linear colours between them are within

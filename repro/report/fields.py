@@ -5,8 +5,6 @@ their own range, the largest integer for a value that is not finite. Fields of t
 only its nodes or triangles, in ascending order.
 """
 
-from __future__ import annotations
-
 import base64
 from pathlib import Path
 from xml.etree import ElementTree

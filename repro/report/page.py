@@ -1,7 +1,5 @@
 """A page in one file, with its style and scripts. It loads nothing, and escapes all text."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The charts over time of one run or of several runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 

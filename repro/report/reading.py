@@ -1,7 +1,5 @@
 """Read the tables of a run from its folder, for a page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page of one run."""
 
-from __future__ import annotations
-
 import html
 
 import numpy as np

@@ -12,8 +12,6 @@ A file that :func:`write_text` writes is complete or absent, and so are tables, 
 empty field of a table is a quantity that the scene does not model.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The arrays of the ``.vtu`` files: each is defined here, once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial

@@ -1,7 +1,5 @@
 """The columns of ``timeseries.csv`` and ``ledger.csv``: each is defined here, once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial

@@ -4,8 +4,6 @@ Arrays are compressed by zlib, in base64; ParaView, PyVista and VTK read these f
 imported with the first file, because many commands neither write nor read one.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -5,8 +5,6 @@ run is in progress, it also has the SHA-256 of the run's other files. These sums
 changes. They give no protection against intentional ones.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

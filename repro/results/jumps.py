@@ -4,8 +4,6 @@ A row at a jump has the state just after it (:mod:`repro.march.loop`). A curve k
 the row before up to the jump.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Words and units of the columns and arrays of a run's files, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -5,8 +5,6 @@ denotes a pure number. Formulas give the package's own units (um, h, mg/L, MPa);
 converts them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

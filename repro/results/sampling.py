@@ -1,7 +1,5 @@
 """Values of fields at places: probes, line profiles and regular grids."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

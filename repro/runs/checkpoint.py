@@ -7,8 +7,6 @@ Reading a checkpoint executes nothing. The checksum detects accidental changes. 
 against a forged checkpoint with a forged checksum.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -3,8 +3,6 @@
 Rows and fields are written as they are computed.
 """
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence

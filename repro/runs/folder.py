@@ -5,8 +5,6 @@ its ``run.json``, the fields in its ``fields.sha256`` (listed before they are wr
 checkpoints.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """The history of a run: its rows, fields and counts so far. A checkpoint stores it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

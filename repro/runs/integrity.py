@@ -1,7 +1,5 @@
 """Check by SHA-256 whether the files of a run are complete and unchanged."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from repro.errors import OutputError

@@ -3,8 +3,6 @@
 The first signal asks for the stop; a later one ends the process at once.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

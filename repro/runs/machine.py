@@ -1,7 +1,5 @@
 """Packages that a run needs, and the conditions on which its numbers depend besides the scene."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform

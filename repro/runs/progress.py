@@ -4,8 +4,6 @@ Each is a context that yields the function ``tell`` of :class:`repro.runs.execut
 always go to standard error.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

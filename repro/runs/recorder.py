@@ -1,7 +1,5 @@
 """The files that a run writes, and the checkpoint from which it resumes."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Iterable
 from contextlib import suppress

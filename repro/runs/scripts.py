@@ -1,7 +1,5 @@
 """Runs on the disk from scripts and notebooks: make, resume and load them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress

@@ -4,8 +4,6 @@ The checksum of a checkpoint guarantees that its numbers are unchanged. This mod
 they belong to the scene.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, astuple
 from typing import Any
 

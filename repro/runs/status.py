@@ -1,7 +1,5 @@
 """The ``status`` of a run in its ``run.json``."""
 
-from __future__ import annotations
-
 import re
 
 COMPLETED = "completed"

@@ -1,7 +1,5 @@
 """Refuse arguments of a wrong type by their names, before a function does anything."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Sequence
 from functools import cache, wraps

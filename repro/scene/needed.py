@@ -1,7 +1,5 @@
 """What is optional: sections of a scene, which a stage requires, and packages."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any, TypeVar
 

@@ -5,8 +5,6 @@ space, so that they still change with the preset. All words come from the fields
 :mod:`repro.scene`.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, Field

@@ -4,8 +4,6 @@ A worker makes its runs in processes of its own. If a worker dies, another one r
 lock of the folder admits one process at a time.
 """
 
-from __future__ import annotations
-
 import asyncio
 import os
 from collections.abc import Iterator, Sequence

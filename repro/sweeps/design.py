@@ -5,8 +5,6 @@ Two forms: a range ``flow.mean_velocity=0.3:30 m/day:log:8`` (both ends in the u
 ``numerics.preset=fast, paper``. A Latin hypercube takes its ranges without the number of values.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

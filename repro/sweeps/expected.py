@@ -1,7 +1,5 @@
 """The expected time and disk space of a sweep, for ``repro sweep --dry-run``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from tempfile import TemporaryDirectory
 

@@ -4,8 +4,6 @@ The folder of each run is the same as one that ``repro run`` makes. The command 
 sweep continues it: unfinished runs are resumed, damaged ones are repeated.
 """
 
-from __future__ import annotations
-
 import os
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass

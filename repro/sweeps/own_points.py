@@ -4,8 +4,6 @@ The name of a column is a key with its unit in parentheses, such as ``pore.width
 have their unit themselves, such as ``50 um``, or be words. Rows count from 1, without the head.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

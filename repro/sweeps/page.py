@@ -3,8 +3,6 @@
 The page needs no network.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from functools import partial
 from html import escape

@@ -4,8 +4,6 @@ Each process makes one run at a time. If a process ends, only its run fails, and
 makes the next one.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -3,8 +3,6 @@
 A sweep treats the folder of each run as ``repro run`` does.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -3,8 +3,6 @@
 ``table.csv`` has a row for each run and time, ``runs.csv`` a row for each run.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterator, Sequence
