@@ -34,7 +34,7 @@ def test_a_table_of_rates_is_one_of_velocities(between):
     scene = driven({**RATE, "flow.rate": rate})
     values = [scene.at(time).flow.mean_velocity * 24 / 1e6 for time in (0, 1, 2, 3)]
     assert values == pytest.approx([3, 4.5 if between == "linear" else 3, 6, 6])
-    assert scene.jumps(2.0) == (between == "steps")
+    assert scene.time_tables.jumps(2.0) == (between == "steps")
 
 
 def test_a_scene_with_a_rate_is_written_and_read_unchanged():

@@ -72,7 +72,8 @@ def test_every_key_that_takes_a_table_has_steps_or_changes_linearly(key):
     for word, expected in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
         loaded = load_scene("base", [f"{key}={between(word, table)}", *beside], unset=without)
         assert [attrgetter(key)(loaded.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(expected, rel=1e-15)
-        assert attrgetter(key)(loaded.largest) == 6 and [loaded.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
+        assert attrgetter(key)(loaded.largest) == 6
+        assert [loaded.time_tables.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
 
 
 @pytest.mark.parametrize("key", TIMED)
@@ -99,9 +100,9 @@ def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(key):
 
 def test_the_times_of_all_tables_of_a_scene_are_its_corners():
     loaded = load_scene("base", [*SHORT, RISING])
-    assert [loaded.corner(time) for time in (0.0, 0.3, 0.35, 0.4, 0.5)] == [0.3, 0.4, 0.4, 0.5, inf]
+    assert [loaded.time_tables.corner(time) for time in (0.0, 0.3, 0.35, 0.4, 0.5)] == [0.3, 0.4, 0.4, 0.5, inf]
     plain = load_scene("base")
-    assert plain.at(3.0) is plain and plain.largest is plain and plain.corner(0.0) == inf
+    assert plain.at(3.0) is plain and plain.largest is plain and plain.time_tables.corner(0.0) == inf
 
 
 def test_updates_end_at_every_multiple_and_at_all_times_of_all_tables():

@@ -39,7 +39,7 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     end = scene.growth.end
     ends = [0.0]
     while end - ends[-1] > SAME_TIME:
-        ends.append(next_time(scene.growth, ends[-1], scene.corner(ends[-1])))
+        ends.append(next_time(scene.growth, ends[-1], scene.time_tables.corner(ends[-1])))
     return ends, {0.0, *(scene.requested_times or ends)}
 
 

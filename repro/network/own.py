@@ -35,7 +35,7 @@ from repro.network.uptakes import FASTEST, TRANSPORTS, Law, Throats, Transport, 
 from repro.results import provenance, write_text
 from repro.results.files import output_path, read_sealed, sealed, sha256
 from repro.runs.machine import source_hash, statements
-from repro.scene import Scene, SceneError, load_scene, needed, scene_tables
+from repro.scene import Scene, SceneError, load_scene, scene_tables
 from repro.timing import progress_bar
 
 #: Seed of the drawn states, a date.
@@ -101,14 +101,14 @@ def tabulated(scene: Scene, progress: bool = False) -> Laws:
     """
     _refuse(scene)
     key = _key(scene)
-    file = _folder() / f"network-law-{key}.json"
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    file = caches / "dupin2001-repro" / f"network-law-{key}.json"
     if file not in _KNOWN:
         table = _read(file, key)
         if table is None:
             table = _fitted(scene, *solved(scene, np.random.default_rng(SEED), progress))
             _write(file, key, table)
-        ratio = needed(needed(scene.flow, "a flow").viscosity_ratio, "a viscosity")
-        _KNOWN[file] = Laws(_law(scene, table), table.shapes, ratio, file)
+        _KNOWN[file] = Laws(_law(scene, table), table.shapes, scene.flow.viscosity_ratio, file)
     return _KNOWN[file]
 
 
@@ -127,11 +127,6 @@ def _refuse(scene: Scene) -> None:
     for need, suits in needs.items():
         if not suits:
             raise SceneError(f"{scene.name}: the laws for networks need {need}")
-
-
-def _folder() -> Path:
-    """Return the user's cache folder of this package."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dupin2001-repro"
 
 
 def _key(scene: Scene) -> str:

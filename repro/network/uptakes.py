@@ -154,14 +154,14 @@ class Throats:
         kinetics = self.law.rates.constants
         ratio = kinetics.acceptor_to_donor_ratio
         acceptor_limit, donor_limit = self._inflows
-        most = np.minimum(acceptor_limit / ratio, donor_limit)
+        limit = np.minimum(acceptor_limit / ratio, donor_limit)
         _, fastest = self._uptake_at(*self.supplies)
 
         def rate(donor: np.ndarray) -> np.ndarray:
             acceptor = self._concentration(0, self._acceptor_uptake(donor))
             return self._uptake_at(acceptor, self._concentration(1, donor))[1]
 
-        donor = _balance(np.zeros_like(most), np.minimum(most, fastest), rate)
+        donor = _balance(np.zeros_like(limit), np.minimum(limit, fastest), rate)
         acceptor = self._acceptor_uptake(donor)
         decayed = (acceptor - ratio * donor) / kinetics.decay_oxygen_demand
         growth = (kinetics.yield_coefficient * donor - decayed) / kinetics.maximum_density
@@ -180,8 +180,8 @@ class Throats:
         """(n,) uptake of the acceptor: for the uptake of the donor (n,), and for decay."""
         need = self.law.rates.constants.acceptor_to_donor_ratio * donor
         spare = np.maximum(self.inflow * self.supplies[0] - need, 0.0)
-        most = need + np.minimum(self._demand_of_decay(self.supplies[0]), spare)
-        return _balance(need, most, lambda acceptor: (
+        limit = need + np.minimum(self._demand_of_decay(self.supplies[0]), spare)
+        return _balance(need, limit, lambda acceptor: (
             need + self._demand_of_decay(self._concentration(0, acceptor))))
 
     def _demand_of_decay(self, acceptor: np.ndarray) -> np.ndarray:

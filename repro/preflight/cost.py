@@ -23,7 +23,7 @@ from repro.march.step_control import SHORTEST, exceeds_tolerance
 from repro.polling import poll
 from repro.preflight.memory import MB, expected_bytes
 from repro.preflight.outlook import MOST_NODES, CoarseRun
-from repro.scene import Scene, needed
+from repro.scene import Scene
 
 #: The state after a step and, if the step is reported, its row.
 ReportedStep: TypeAlias = tuple[RestartState, Report | None]
@@ -79,7 +79,7 @@ def run_trial(scene: Scene, nodes: int, advance: bool = True) -> Trial:
                         output=replace(scene.output, times=(end,), every=None))
     clock = [perf_counter()]
     run = iterate_steps(scene)
-    first = needed(next(run)[1], "the first row")
+    first = next(run)[1]
     clock.append(perf_counter())
     worst = 0.0
     with suppress(RunEnd):
@@ -116,13 +116,12 @@ def expect_steps(scene: Scene, coarse: CoarseRun) -> tuple[float, float]:
     expected to be as long as growth.time_step and to cost as much as the first ones.
     """
     if not coarse.steps:
-        growth = needed(scene.growth, "growth")
-        return growth.end / growth.time_step, 1.0
+        return scene.growth.end / scene.growth.time_step, 1.0
     counts = [_count(scene, coarse.scene, length) for length, _ in coarse.steps]
     costs = [count * seconds for count, (_, seconds) in zip(counts, coarse.steps)]
     half = len(counts) // 2
     covered = sum(length for length, _ in coarse.steps)
-    remaining = 0.0 if coarse.ends else needed(scene.growth, "growth").end - covered
+    remaining = 0.0 if coarse.ends else scene.growth.end - covered
     share = remaining / sum(length for length, _ in coarse.steps[half:])
     count = sum(counts) + share * sum(counts[half:])
     first = min(seconds for _, seconds in coarse.steps[:FIRST_STEPS])
@@ -134,7 +133,7 @@ def _count(scene: Scene, coarse: Scene, length: float) -> float:
 
     Steps of the midpoint rule scale with the root of the tolerance.
     """
-    time_step = needed(scene.growth, "growth").time_step
+    time_step = scene.growth.time_step
     if not scene.numerics.scheme.controls_error:
         return length / time_step
     finer = math.sqrt(coarse.numerics.tolerance / scene.numerics.tolerance)

@@ -12,7 +12,7 @@ from repro.model.transport_in_time import transport_in_time
 from repro.polling import OutOfTime, within
 from repro.preflight.memory import first_nodes
 from repro.preflight.simplifications import Caveat, warn_surface
-from repro.scene import PRESETS, Scene, needed
+from repro.scene import PRESETS, Scene
 from repro.schemes import CURVED
 
 #: Wall time (s) of a coarse run.
@@ -102,6 +102,6 @@ def sketched(scene: Scene) -> Scene:
     scheme = replace(scheme, steps="updates" if stores else "midpoint")
     coarse: dict[str, Any] = {"contact_elements": 0.0, **PRESETS["sketch"]}
     numerics = replace(numerics, preset="sketch", **coarse, exchanged=scheme)
-    end = needed(scene.growth, "growth").end
+    end = scene.growth.end
     output = replace(scene.output, times=(end,), every=None)
     return replace(scene, numerics=numerics, output=output)

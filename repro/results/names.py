@@ -51,14 +51,9 @@ def words(name: str) -> str:
     return quantity.words if quantity else name.removesuffix(ending(name)).replace("_", " ")
 
 
-def udunits(name: str) -> str:
-    """The unit of a name in the spelling of UDUNITS, "1" for a pure number."""
-    return unit_of(name).udunits
-
-
 def attributes(name: str) -> dict[str, str]:
     """The attributes of a variable by the conventions of CF: unit and words."""
-    return {"units": udunits(name), "long_name": words(name)}
+    return {"units": unit_of(name).udunits, "long_name": words(name)}
 
 
 def unit(name: str) -> str:

@@ -47,7 +47,6 @@ UNITS = {"_m_per_d": Unit("m d-1", "m/day", 24e-6), "_mg_per_L": Unit("mg L-1", 
          "_uN_per_m": Unit("uN m-1", "uN/m", 1e6), "_nN": Unit("nN", "nN", 1e3),
          "_uL_per_min": Unit("uL min-1", "uL/min", 1e-9 / 60),
          "_pg_per_h": Unit("pg h-1", "pg/h", 1e-6)}
-PURE = Unit("1", "")
 #: Units in which pages show small values, by the endings of names: symbol and factor, the largest
 #: unit first.
 SMALLER = {"_MPa": (("kPa", 1e3), ("Pa", 1e6))}
@@ -125,7 +124,7 @@ def ending(name: str) -> str:
 @cache
 def unit_of(name: str) -> Unit:
     """Return the unit at the end of a name."""
-    return UNITS.get(ending(name), PURE)
+    return UNITS.get(ending(name), Unit("1", ""))
 
 
 def plain(name: str) -> str:

@@ -37,7 +37,7 @@ from repro.runs.folder import (
     remove_temporary,
 )
 from repro.runs.integrity import find_damage
-from repro.runs.machine import conditions, differences, refuse_exchanged, require_packages
+from repro.runs.machine import differences, refuse_exchanged, require_packages
 from repro.runs.recorder import Recorder, complete_folder, interruption
 from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, is_over
 from repro.scene import (
@@ -300,7 +300,7 @@ def _find_changes(record: dict, recorder: Recorder, watch: Watch) -> dict[str, l
     """Find changes since the run began that could change its numbers, and warn of them."""
     before = {key: record[key] for key in ("versions", "conditions")}
     after = {"versions": results.provenance(recorder.scene)["versions"],
-             "conditions": conditions()}
+             "conditions": recorder.conditions}
     changed = {key: pair for key, pair in differences(before, after).items()
                if not key.startswith("conditions.threads")}
     if changed:

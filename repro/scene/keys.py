@@ -650,14 +650,6 @@ class Scene:
         """Return the scene with rows at these times (h) alone."""
         return replace(self, output=replace(self.output, every=None, times=times))
 
-    def corner(self, time: float) -> float:
-        """Return the next time (h) of its tables after ``time``; infinite if there is none."""
-        return self.time_tables.corner(time)
-
-    def jumps(self, time: float) -> bool:
-        """Return whether a value of its tables jumps at a time (h)."""
-        return self.time_tables.jumps(time)
-
     def stated(self, section: str, key: str) -> Stated:
         """Return the value of a key of a section, a quantity, in the unit of the scene's text.
 

@@ -1029,8 +1029,8 @@ MUTANTS = (
         ("time-not-looked-at",
          "The time that the coarse run did not reach costs nothing.",
          "expect_steps",
-         'remaining = 0.0 if look.ends else needed(scene.growth, "growth").end - covered',
-         'remaining = 0.0 if True else needed(scene.growth, "growth").end - covered',
+         'remaining = 0.0 if coarse.ends else scene.growth.end - covered',
+         'remaining = 0.0 if True else scene.growth.end - covered',
          f"{CHECK}steps_are_expected_from_those_of_the_coarse_run")),
     *changes(
         "repro/polling.py",
