@@ -163,10 +163,10 @@ def test_many_steps_are_merged_to_their_means():
 
 
 def test_many_points_are_thinned_with_both_ends():
-    line = charts.Line("x", np.arange(5000.0), np.arange(5000.0) ** 2, dots=True)
+    line = charts.Line("x", np.arange(5000.0), np.arange(5000.0) ** 2)
     thin = charts.thinned(line)
     assert len(thin.times) == charts.MOST_POINTS and thin.times[[0, -1]].tolist() == [0, 4999]
-    assert (thin.values == thin.times**2).all() and thin.dots
+    assert (thin.values == thin.times**2).all()
 
 
 def test_the_colours_of_values_are_those_of_matplotlib():

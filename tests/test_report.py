@@ -236,7 +236,7 @@ def test_the_table_in_docs_is_that_of_the_definitions():
     docs = Path(__file__).parents[1] / "docs"
     text = runpy.run_path(str(docs / "quantities.py"))["text"]()
     assert (docs / "quantities.md").read_text(encoding="utf-8") == text
-    for name in (*results.COLUMNS, *results.LEDGER_COLUMNS, *names.KNOWN, "clogging_time_h", "remeshed_nodes"):
+    for name in (*results.COLUMNS, *results.LEDGER_COLUMNS, *names.KNOWN, "clogging_time_h"):
         assert f"| `{name}` |" in text
 
 

@@ -33,14 +33,12 @@ class Line:
     label: str
     times: np.ndarray
     values: np.ndarray
-    dots: bool = False  # drawn as separate dots
 
     @property
     def constant(self) -> bool:
-        """Whether its finite values are equal, to round-off, or there are none. Dots are not."""
+        """Whether its finite values are equal, to round-off, or there are none."""
         finite = self.values[np.isfinite(self.values)]
-        largest = np.abs(finite).max(initial=0.0)
-        return not self.dots and bool(np.ptp(finite) <= EQUAL * largest if len(finite) else True)
+        return not len(finite) or bool(np.ptp(finite) <= EQUAL * np.abs(finite).max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +92,10 @@ def svg(chart: Chart) -> str:
     upright = f'y1="{TOP}" y2="{HEIGHT - BOTTOM}"'
     places = [f"{x(time):.1f}" for time in chart.marks if x.low <= time <= x.high]
     marks = "".join(f'<line class="mark" x1="{place}" x2="{place}" {upright}/>' for place in places)
-    marks += "".join(curve(x, y, line.times, line.values, k, dots=line.dots)
-                     for k, line in enumerate(lines))
+    marks += "".join(curve(x, y, line.times, line.values, k) for k, line in enumerate(lines))
     marks += f'<line class="now" x1="0" x2="0" {upright} visibility="hidden"/>'
     plot = drawing(x, y, ("time (h)", chart.axis), f"{chart.title} over time", marks)
-    entries = "".join(f"<span>{swatch(k, line.dots)}{escape(line.label)}</span>"
+    entries = "".join(f"<span>{swatch(k)}{escape(line.label)}</span>"
                       for k, line in enumerate(lines))
     legend = f'<span class="legend">{entries}</span>' if len(lines) > 1 else ""
     return (f'<figure class="chart" data-chart="{escape(_pointer_data(lines, x))}">'
@@ -215,8 +212,8 @@ def number(value: float, digits: int | None = None) -> str:
 
 
 def curve(x: Scale, y: Scale, coordinates: np.ndarray, values: np.ndarray, colour: int,
-          title: str = "", dots: bool = False) -> str:
-    """Values (n,) at coordinates (n,): lines between gaps; dots for single points, or for all."""
+          title: str = "") -> str:
+    """Values (n,) at coordinates (n,): lines between gaps; dots for single points."""
     is_drawable = np.isfinite(coordinates) & np.isfinite(values)
     for scale, numbers in ((x, coordinates), (y, values)):
         is_drawable &= (numbers > 0) | (not scale.log)
@@ -225,7 +222,7 @@ def curve(x: Scale, y: Scale, coordinates: np.ndarray, values: np.ndarray, colou
     drawn = ""
     for piece in pieces:
         points = list(map(point, x(coordinates[piece]), y(values[piece])))
-        drawn += (polyline(points, colour, title) if len(points) > 1 and not dots else
+        drawn += (polyline(points, colour, title) if len(points) > 1 else
                   "".join(dot(place, colour, title) for place in points))
     return drawn
 
@@ -262,10 +259,10 @@ def _element(name: str, attributes: str, title: str) -> str:
     return f"<{name} {attributes}><title>{escape(title)}</title></{name}>"
 
 
-def swatch(k: int, dots: bool = False) -> str:
+def swatch(k: int) -> str:
     """A sample of a line for a legend."""
-    kind = dot("12,5", k) if dots else polyline(["0,5", "24,5"], k)
-    return f'<svg class="swatch" viewBox="0 0 24 10" aria-hidden="true">{kind}</svg>'
+    line = polyline(["0,5", "24,5"], k)
+    return f'<svg class="swatch" viewBox="0 0 24 10" aria-hidden="true">{line}</svg>'
 
 
 def _pointer_data(lines: Sequence[Line], x: Scale) -> str:

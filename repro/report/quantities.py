@@ -84,10 +84,6 @@ DERIVED = (
              "sum of biomass_made_pg_per_m up to the step's end",
              lambda run: (run.ledger["end_h"], np.cumsum(run.ledger["biomass_made_pg_per_m"])),
              "made since t = 0", signed=True),
-    Quantity("remeshed_nodes", "nodes of a new mesh", "nodes, where remeshed is 1",
-             lambda run: (run.times, np.where(run.series.get("remeshed", run.times * 0) == 1,
-                                              run.series.get("nodes", np.nan), np.nan)),
-             "new mesh"),
 )
 DERIVED_BY_NAME = {each.name: each for each in DERIVED}
 
@@ -120,7 +116,7 @@ KINDS = (
     Kind("Ledger: biomass", "biomass", ("biomass_held_ug_per_m", "biomass_made_ug_per_m")),
     Kind("Defects of the balances", "relative defect",
          (*_pair("{}_balance"), "biomass_balance", "oxygen_demand_balance"), True),
-    Kind("Mesh", "nodes", ("nodes", "remeshed_nodes"), True),
+    Kind("Mesh", "nodes", ("nodes",), True),
 )
 
 
@@ -142,10 +138,9 @@ def series(run: Run) -> dict[str, TimeSeries]:
     """
     drawable = {name: with_jumps(name, run.times, values, run.record["tables"])
                 for name, values in run.series.items()}
-    for quantity in DERIVED:
-        if len(run.ledger.get("end_h", ())) or quantity.name == "remeshed_nodes":
-            times, values = quantity.value(run)
-            drawable[quantity.name] = times, quantity.unit.factor * values
+    for quantity in DERIVED if len(run.ledger.get("end_h", ())) else ():
+        times, values = quantity.value(run)
+        drawable[quantity.name] = times, quantity.unit.factor * values
     return {name: (times, values) for name, (times, values) in drawable.items()
             if np.isfinite(values).any() and (values.any() or "_stored_" not in name)}
 
@@ -161,9 +156,9 @@ def charts_of(run: Run) -> list[Chart]:
     for kind in kinds(drawable):
         lines = [_line(_named(name).label, name, drawable) for name in kind.drawn
                  if name in drawable]
-        if all(line.constant or line.dots for line in lines):
+        if all(line.constant for line in lines):
             continue
-        lines = [line for line in lines if line.dots or np.nan_to_num(line.values).any()]
+        lines = [line for line in lines if np.nan_to_num(line.values).any()]
         one_of_several = len(lines) == 1 < len(kind.drawn)
         title = f"{kind.title}: {lines[0].label}" if one_of_several else kind.title
         drawn.append(kind.chart(title, lines, contact(run)))
@@ -191,7 +186,7 @@ def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
 def _line(label: str, name: str, drawable: dict[str, TimeSeries]) -> Line:
     """Make the line of a quantity. An unknown one has no points: each run keeps its colour."""
     times, values = drawable.get(name, (np.array([]), np.array([])))
-    return Line(label, times, values, dots=name == "remeshed_nodes")
+    return Line(label, times, values)
 
 
 def contact(run: Run) -> list[float]:

@@ -15,8 +15,8 @@ from repro.scene import SceneError
 OWN_PLACE = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
         "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
-NESTED = ("Each bar is the time within a stage. A stage includes the time of those that it calls, "
-          "such as factorising and solving, so the sum of the bars exceeds the total time.")
+NESTED = ("A stage includes the time of those that it calls, such as factorising and solving, so the "
+          "sum of the stages exceeds the total time.")
 #: Colours of a field. Neighbours cannot be told apart.
 BANDS = 128
 
@@ -166,22 +166,11 @@ def _cost(run: Run) -> str:
     if "growth" in record["tables"]:
         counts.append(("new meshes", record["remeshes"]))
     total_text = f"<p>{total:.3g} s in all, without this page.</p>"
-    bars = _bars(record["wall_time_by_stage_s"], total)
-    return page.section("Cost", total_text, bars, page.table("", [], counts))
-
-
-def _bars(stages: dict, total: float) -> str:
-    """Seconds by stage, the longest first; the lengths are parts of the total. Empty without any.
-    """
-    positive = sorted((-value, name) for name, value in stages.items() if value > 0)
-    rows = ""
-    for k, (negative, name) in enumerate(positive):
-        top, width = 22 * k, 150 * min(1.0, -negative / total)
-        rows += (f'<text x="0" y="{top + 15}">{html.escape(name)}</text>'
-                 f'<rect x="135" y="{top + 4}" width="{width:.1f}" height="14"/>'
-                 f'<text x="{140 + width:.1f}" y="{top + 15}">{-negative:.3g} s</text>')
-    return rows and (f'<svg class="bars" viewBox="0 0 340 {22 * len(positive) + 4}" role="img" '
-                     f'aria-label="seconds by stage">{rows}</svg><p class="note">{NESTED}</p>')
+    stages = sorted(((seconds, name) for name, seconds in record["wall_time_by_stage_s"].items()
+                     if seconds > 0), reverse=True)
+    times = page.table("", [], [(name, f"{seconds:.3g} s") for seconds, name in stages])
+    note = times and f'<p class="note">{NESTED}</p>'
+    return page.section("Cost", total_text, times, note, page.table("", [], counts))
 
 
 def _provenance(run: Run) -> str:
