@@ -53,7 +53,7 @@ class AddedResistance(NamedTuple):
 
 
 def resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | None, ratio: float,
-               outside: str = "raise", shapes: np.ndarray | None = None,
+               outside: str = "raise", *, shapes: np.ndarray | None = None,
                largest: float = np.inf) -> AddedResistance:
     """Return the law; arguments as for :func:`repro.added_resistance`.
 

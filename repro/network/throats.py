@@ -69,7 +69,8 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike | Non
         laws = own.tabulated(load_scene(scene), progress)
         shapes, largest, ratio = laws.shapes, laws.uptake.share, laws.viscosity_ratio
     ratio = ratio if viscosity_ratio is None else float(viscosity_ratio)
-    return resistance.resistance(area, width, spanned, ratio, outside, shapes, largest)
+    return resistance.resistance(area, width, spanned, ratio, outside, shapes=shapes,
+                                 largest=largest)
 
 
 def uptake(area: ArrayLike, width: ArrayLike, velocity: ArrayLike,

@@ -102,10 +102,7 @@ class Uptake:
     @property
     def layer(self) -> float:
         """(D K_s / (q X_m))^1/2 (um); infinite without uptake or supply."""
-        if not (self.rate and self.substrate.supply):
-            return math.inf
-        inside = self.substrate.diffusivity_in_aggregate
-        return math.sqrt(inside * self.law.half_saturation / self.rate)
+        return 1 / self.per_layer if self.rate and self.substrate.supply else math.inf
 
     @property
     def depth(self) -> float:

@@ -212,7 +212,7 @@ def number(value: float, digits: int | None = None) -> str:
 
 
 def curve(x: Scale, y: Scale, coordinates: np.ndarray, values: np.ndarray, colour: int,
-          title: str = "") -> str:
+          *, title: str = "") -> str:
     """Values (n,) at coordinates (n,): lines between gaps; dots for single points."""
     is_drawable = np.isfinite(coordinates) & np.isfinite(values)
     for scale, numbers in ((x, coordinates), (y, values)):

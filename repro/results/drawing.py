@@ -146,7 +146,7 @@ def _add_lines(ax: Any, lines: Iterable[np.ndarray], **style: Any) -> Any:
     return collection
 
 
-def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = None,
+def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = None, *,
           limits: np.ndarray | None = None, box: np.ndarray | None = None,
           style: Style = PLAIN) -> Any:
     """Draw a field with the outline of the aggregate and a colour bar; returns the axes.
@@ -263,7 +263,7 @@ def against(frame: Any, factors: Sequence[Any], name: str, title: str, ax: Any =
                           for factor, value in zip(others, values))
         ordered = group.sort_values(first.column) if first.numeric else group
         ax.plot(ordered[first.column], ordered[name], marker="o", label=label or None)
-    if first.spacing == "log":
+    if first.is_log:
         ax.set_xscale("log")
     ax.set(xlabel=f"{first.key} ({first.unit})" if first.unit else first.key,
            ylabel=names.with_unit(name))
@@ -345,7 +345,8 @@ def _frames(results: Results, name: str, style: Style, ax: Any) -> Iterator[Any]
     for time, fields in zip(results.time, rows):
         if ax is not None:
             ax.clear()
-        ax = field(fields, name, heading(results, time, style), ax, limits, box, style)
+        ax = field(fields, name, heading(results, time, style), ax, limits=limits, box=box,
+                   style=style)
         yield ax
 
 

@@ -314,7 +314,7 @@ def _growth_rules(scene: "Scene", growth: "Growth") -> Rules:
     if growth.erosion:
         yield from _erosion_rules(scene, growth, growth.erosion)
     yield from _mirrored_rules(growth, scene.pore.upper_wall)
-    included = growth.fluid_forces == "included"
+    included = growth.has_fluid_forces
     yield included and scene.flow is None, {
         "growth.fluid_forces": '"neglected" is needed without [flow]'}
     yield included and stress_free, {
@@ -377,8 +377,7 @@ def _erosion_rules(scene: "Scene", growth: "Growth", erosion: "Erosion") -> Rule
 
 def _mirrored_rules(growth: "Growth", upper_wall: str) -> Rules:
     """Beside a plane of symmetry, forces of walls and water are not verified, so not accepted."""
-    unverified = {"fluid_forces": growth.fluid_forces == "included",
-                  "wall": growth.wall == "bonded",
+    unverified = {"fluid_forces": growth.has_fluid_forces, "wall": growth.bonded,
                   "bonding_strength": growth.bonding_strength is not None,
                   "tensile_strength": growth.tensile_strength is not None}
     for key, is_set in unverified.items():

@@ -53,6 +53,16 @@ class Factor:
     count: int | None = None  # of a range in a grid
 
     @property
+    def is_range(self) -> bool:
+        """Are the values the ends of a range?"""
+        return self.spacing != "list"
+
+    @property
+    def is_log(self) -> bool:
+        """Is it a logarithmic range?"""
+        return self.spacing == "log"
+
+    @property
     def numeric(self) -> bool:
         """Are the values numbers?"""
         return not isinstance(self.values[0], str)
@@ -151,10 +161,10 @@ def number(text: str) -> tuple[str, str]:
 
 def levels(factor: Factor) -> list[float | str]:
     """The values of a factor in a grid. Values between the ends of a range have 12 digits."""
-    if factor.spacing == "list":
+    if not factor.is_range:
         return list(factor.values)
     low, high = factor.values
-    spaced = np.geomspace if factor.spacing == "log" else np.linspace
+    spaced = np.geomspace if factor.is_log else np.linspace
     spaced_values = spaced(low, high, factor.count or 2).tolist()
     return [low, *(float(f"{value:.12g}") for value in spaced_values[1:-1]), high]
 
@@ -165,7 +175,7 @@ def grid(factors: list[Factor]) -> list[tuple]:
     Raises SceneError for a range without a number of values.
     """
     for factor in factors:
-        if factor.spacing != "list" and factor.count is None:
+        if factor.is_range and factor.count is None:
             raise SceneError(f"--vary {factor.key}: how many values is needed after "
                              f"{factor.spacing}, such as :8, or --samples N for a Latin hypercube")
     if math.prod(factor.count or len(factor.values) for factor in factors) > MOST_POINTS:
@@ -192,10 +202,10 @@ def latin(factors: list[Factor], samples: int, seed: int) -> list[tuple]:
 
 def at(factor: Factor, fraction: float) -> float | str:
     """The value of a factor at a fraction (0 to 1) of its range or list."""
-    if factor.spacing == "list":
+    if not factor.is_range:
         return factor.values[min(int(fraction * len(factor.values)), len(factor.values) - 1)]
     low, high = factor.values
-    if factor.spacing == "log":
+    if factor.is_log:
         return low * (high / low) ** fraction
     return low + fraction * (high - low)
 

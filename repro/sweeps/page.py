@@ -61,7 +61,7 @@ def _colours() -> str:
 def _describe(factor: Factor) -> str:
     values = list(dict.fromkeys(factor.values))
     first, last = factor.short(min(values)), factor.short(max(values))
-    if factor.spacing != "list":
+    if factor.is_range:
         count = f", {factor.count} values" if factor.count else ""
         return f"{factor.key}: {first} to {last}, {factor.spacing}{count}"
     if len(values) <= 2 * LEVELS or not factor.numeric:
@@ -72,7 +72,7 @@ def _describe(factor: Factor) -> str:
 def _is_logarithmic(factor: Factor) -> bool:
     """Does the factor need a logarithmic scale?"""
     numbers = [_number(factor, value) for value in factor.values] if factor.numeric else [1.0]
-    return factor.spacing == "log" or factor.spacing == "list" and charts.is_wide(numbers)
+    return factor.is_log or not factor.is_range and charts.is_wide(numbers)
 
 
 def _number(factor: Factor, value: float | str) -> float:
@@ -132,7 +132,7 @@ def _coloured(sweep: Sweep, plotted: list[SweepRun], k: int) -> str:
     x = charts.across(*_ends(np.concatenate([run.biomass for run in plotted])))
     y = charts.upwards(*_ends(np.concatenate([run.relative for run in plotted])))
     lines = [charts.curve(x, y, run.biomass, run.relative, _level(factor, run.point.values[k]),
-                          _run_title(sweep, run)) for run in plotted]
+                          title=_run_title(sweep, run)) for run in plotted]
     axes = "biomass: aggregate area / pore area", "conductivity / initial conductivity"
     label = f"Conductivity against biomass, coloured by {factor.key}"
     return charts.drawing(x, y, axes, label, "".join(lines)) + _key(factor, plotted, k)
