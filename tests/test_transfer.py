@@ -50,19 +50,20 @@ def test_a_point_far_outside_is_refused(arcs):
 def test_folded_positions_at_the_start_are_unfolded(arcs):
     """A middle node whose position at t = 0 turns its triangle over moves half way between its corners; other nodes
     stay. Corners that fold are refused, also those of straight triangles."""
-    assert transfer.unfolded(arcs, arcs.points) is arcs.points
+    region, = arcs.regions
+    assert transfer.unfolded(arcs, arcs.points, region) is arcs.points
     body, origin = arcs.cells[arcs.biomass], arcs.points.copy()
     cell = body[np.argmin(np.isin(body[:, 3:], arcs.loop).sum(axis=1))]
     origin[cell[3]] = origin[cell[2]]
-    corrected = transfer.unfolded(arcs, origin)
+    corrected = transfer.unfolded(arcs, origin, region)
     assert np.allclose(corrected[cell[3]], 0.5 * (origin[cell[0]] + origin[cell[1]]))
     assert np.array_equal(corrected[:arcs.corners], origin[:arcs.corners])
     assert not arcs.moved(corrected).turned_over(np.flatnonzero(arcs.biomass)).any()
     origin[cell[0]] = 2 * origin[cell[1]] - origin[cell[0]] + 3 * (origin[cell[2]] - origin[cell[1]])
     for grid, places in ((arcs, origin), (arcs.straight, origin[: arcs.corners])):
         with pytest.raises(TransferError, match="the places at t = 0 fold"):
-            transfer.unfolded(grid, places)
-    assert transfer.unfolded(arcs.straight, arcs.straight.points) is arcs.straight.points
+            transfer.unfolded(grid, places, *grid.regions)
+    assert transfer.unfolded(arcs.straight, arcs.straight.points, *arcs.straight.regions) is arcs.straight.points
 
 
 def strip(count, shift):
@@ -75,7 +76,7 @@ def strip(count, shift):
     cells = [(*t, *(len(corners) + edges.index(tuple(sorted(edge))) for edge in zip(t, (*t[1:], t[0]))))
              for t in triangles]
     points = np.vstack([corners, middles])
-    return SimpleNamespace(points=points, cells=np.array(cells), biomass=np.ones(count, bool), geometry=2)
+    return SimpleNamespace(points=points, cells=np.array(cells), geometry=2)
 
 
 @pytest.mark.parametrize("shift", [-0.4, 0.4])
@@ -84,7 +85,7 @@ def test_a_corrected_triangle_may_turn_its_neighbour_over(shift):
     the end that the sign selects."""
     mesh = strip(9, shift)
     derivatives = checked_map_derivatives(2)
-    corrected = transfer.unfolded(mesh, mesh.points)
+    corrected = transfer.unfolded(mesh, mesh.points, mesh)
     assert np.allclose(corrected, strip(9, 0.0).points)
     jacobians = elements.jacobian(mesh.points[mesh.cells], derivatives)
     assert (elements.determinant(jacobians).min(axis=1) < 0).sum() == 1

@@ -136,15 +136,14 @@ def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
     return interpolate(points, triangles, fields, new_points)
 
 
-def unfolded(mesh: Mesh, origin: np.ndarray, region: Region | None = None) -> np.ndarray:
-    """Coordinates at t = 0 (N, 2) um for which no triangle of an aggregate, or of all, is turned
-    over.
+def unfolded(mesh: Mesh, origin: np.ndarray, region: Region) -> np.ndarray:
+    """Coordinates at t = 0 (N, 2) um for which no triangle of an aggregate is turned over.
 
     In a triangle that is turned over, middles move half way between their corners. Its neighbours
     have the same middles, so they are tested again. Raises OriginFolded if a triangle with straight
     edges is turned over.
     """
-    cells = region.cells if region else mesh.cells[mesh.biomass]
+    cells = region.cells
     derivatives = checked_map_derivatives(mesh.geometry)
     while True:
         det = elements.determinant(elements.jacobian(origin[cells], derivatives))
