@@ -117,7 +117,8 @@ def test_a_sweep_of_a_file_equals_that_of_its_columns(tmp_path, monkeypatch):
 
 def test_many_values_are_described_by_their_range(tmp_path, monkeypatch):
     monkeypatch.setattr(driver, "ready", lambda *_: pytest.fail("no run is made"))
-    plan = driver.plan("flow_only", [], tmp_path, [], {"pore.width (um)": np.linspace(48, 50, 15)}, [], None, 0)
+    plan = driver.plan("flow_only", [], tmp_path, [], points={"pore.width (um)": np.linspace(48, 50, 15)}, unset=[],
+                       samples=None, seed=0)
     text = driver.page.page(plan, driver.table.read_runs(plan, {}, 0.1), 0.1)
     assert "pore.width: 15 values from 48 um to 50 um" in text
 
@@ -151,7 +152,8 @@ def test_the_time_left_is_that_of_the_missing_runs(tmp_path, monkeypatch, capsys
     """It is the time so far times the missing runs over the finished ones."""
     clock = iter([100.0, 110.0, 140.0, 160.0])
     monkeypatch.setattr(driver, "monotonic", lambda: next(clock))
-    plan = driver.plan("flow_only", ["pore.width=48 um, 49 um, 50 um"], tmp_path / "sweep", [], None, [], None, 0)
+    plan = driver.plan("flow_only", ["pore.width=48 um, 49 um, 50 um"], tmp_path / "sweep", [],
+                       points=None, unset=[], samples=None, seed=0)
     events = []
     driver.run_plan(plan, lambda points, folder: ((point, "failed: x") for point in points), tell=events.append)
     assert [event["left_s"] for event in events[1:]] == [20, 20, 0]

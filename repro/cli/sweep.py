@@ -73,7 +73,8 @@ def call(options) -> int:
         from repro.sweeps import expected, pool
 
         plan = driver.plan(options.scene, options.vary, options.out or "", options.set,
-                           options.points, options.unset, options.samples, options.seed)
+                           points=options.points, unset=options.unset, samples=options.samples,
+                           seed=options.seed)
         workers = min(options.workers or pool.cores(), len(plan.points))
         say(printable(expected.describe(plan, workers)))
         return 0

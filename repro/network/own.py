@@ -257,8 +257,9 @@ def _law(scene: Scene, table: Table) -> Law:
     shares = table.states[:, 0] / table.states[:, 1] ** 2
     share = float(shares.max()) if is_plug(shares).any() else share_range(False)[1]
     before, after = (Transport(*row) for row in table.constants.tolist())
-    return law_of(scene, (before, after), float(table.bound),
-                  (low * scene.pore.width, high * scene.pore.width), _supplies(scene), share)
+    return law_of(scene, (before, after), float(table.bound), share=share,
+                  widths=(low * scene.pore.width, high * scene.pore.width),
+                  supplies=_supplies(scene))
 
 
 def throats(law: Law, states: np.ndarray) -> Throats:

@@ -68,7 +68,7 @@ class Law(NamedTuple):
     share: float
 
 
-def law_of(scene: Scene, transports: tuple[Transport, ...], bound: float,
+def law_of(scene: Scene, transports: tuple[Transport, ...], bound: float, *,
            widths: tuple[float, float], supplies: tuple[float, ...], share: float) -> Law:
     """Return the law with the kinetics and the diffusivities of a scene."""
     inside = (kind.diffusivity_in_aggregate for kind in scene.substrates.modelled.values())
@@ -79,8 +79,8 @@ def law_of(scene: Scene, transports: tuple[Transport, ...], bound: float,
 @cache
 def table_1() -> Law:
     """Return the law with the kinetics of Table 1."""
-    return law_of(load_scene("base"), TRANSPORTS, UPTAKE_BOUND, WIDTHS, (LARGEST_SUPPLY,) * 2,
-                  share_range(True)[1])
+    return law_of(load_scene("base"), TRANSPORTS, UPTAKE_BOUND, widths=WIDTHS,
+                  supplies=(LARGEST_SUPPLY,) * 2, share=share_range(True)[1])
 
 
 class Uptake(NamedTuple):

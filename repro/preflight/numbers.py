@@ -136,7 +136,12 @@ def numbers(scene: Scene, speed: float | None, end: Sizes | None = None) -> list
         reynolds = speed * whole_width_of(scene) / scene.flow.kinematic_viscosity
         computed.append(Number("Reynolds", reynolds, None, "u W / nu"))
     if speed is not None and scene.substrates:
-        computed += _transported(scene, speed)
+        for name, substrate in scene.substrates.modelled.items():
+            peclet = speed * whole_width_of(scene) / substrate.diffusivity
+            computed.append(Number(f"Peclet, {name}", peclet, None, "u W / D, D in water"))
+        cell = 1.5 * speed * sized(scene).largest / slowest(scene)
+        computed.append(Number("cell Peclet", cell, None,
+                               "1.5 u h / D, h of the largest elements, the smallest D"))
     if scene.kinetics:
         computed += _taken_up(scene, speed, end)
     if scene.growth:
@@ -158,14 +163,6 @@ def evaluate_at_largest(scene: Scene, velocity: float | None,
         return most, numbers(most, drive.mean_velocity, end)
     rise = drive.driving_head / at_time(scene.flow, 0.0).driving_head
     return most, numbers(most, velocity * rise, end)
-
-
-def _transported(scene: Scene, speed: float) -> Iterator[Number]:
-    for name, substrate in scene.substrates.modelled.items():
-        value = speed * whole_width_of(scene) / substrate.diffusivity
-        yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
-    yield Number("cell Peclet", 1.5 * speed * sized(scene).largest / slowest(scene), None,
-                 "1.5 u h / D, h of the largest elements, the smallest D")
 
 
 def slowest(scene: Scene) -> float:

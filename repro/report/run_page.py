@@ -15,8 +15,8 @@ from repro.scene import SceneError
 OWN_PLACE = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
         "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
-NESTED = ("A stage includes the time of those that it calls, such as factorising and solving, so the "
-          "sum of the stages exceeds the total time.")
+NESTED = ("A stage includes the time of those that it calls, such as factorising and solving, so "
+          "the sum of the stages exceeds the total time.")
 #: Colours of a field. Neighbours cannot be told apart.
 BANDS = 128
 

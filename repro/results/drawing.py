@@ -219,7 +219,7 @@ class Photograph:
 
 
 def drawn_outlines(lines: Sequence[outlines.Outline], title: str, box: np.ndarray, ax: Any,
-                   photograph: Photograph, style: Style) -> Any:
+                   *, photograph: Photograph, style: Style) -> Any:
     """Draw outlines, coloured by their times, over an image if there is one; returns the axes.
 
     box: lower left and upper right corner (um) of the pore.

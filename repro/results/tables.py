@@ -433,7 +433,8 @@ class Results(Mapping[str, np.ndarray]):
             if not lines:
                 raise KeyError(f"{OUTLINES}: this run has no aggregate at these times")
             heading, box = title or self.name, drawing.corners(fields)
-            return drawing.drawn_outlines(lines, heading, box, ax, photograph, style)
+            return drawing.drawn_outlines(lines, heading, box, ax, photograph=photograph,
+                                          style=style)
         if isinstance(time, Sequence) and not isinstance(time, str):
             raise TypeError("plot: time: one time of a field is needed, not a list")
         hours = (self.time[-1] if len(self.time) else 0.0) if time is None else _hours(time)

@@ -79,13 +79,11 @@ class Factor:
 
     def text(self, value: float | str) -> str:
         """A value as in a scene."""
-        number = value if isinstance(value, str) else repr(value)
-        return f"{number} {self.unit}".strip()
+        return f"{value} {self.unit}".strip()
 
     def short(self, value: float | str) -> str:
         """A value with four digits."""
-        number = value if isinstance(value, str) else f"{value:.4g}"
-        return f"{number} {self.unit}".strip()
+        return self.text(value if isinstance(value, str) else f"{value:.4g}")
 
 
 @dataclass(frozen=True)
@@ -211,7 +209,7 @@ def at(factor: Factor, fraction: float) -> float | str:
 
 
 def points(source: Source, sets: list[str], factors: list[Factor], combinations: list[tuple],
-           unset: Sequence[str] = (), origin: str = "run") -> list[Point]:
+           *, unset: Sequence[str] = (), origin: str = "run") -> list[Point]:
     """Make and check the runs of a sweep; sets, unset: the entries of --set and --unset; origin:
     of the points, which precedes their numbers in messages.
 

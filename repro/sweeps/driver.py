@@ -219,15 +219,16 @@ def sweep(scene: Source, vary: Sequence[str] = (), folder: str | Path | None = N
     if folder is None:
         raise SceneError("--out: a folder is needed")
     refuse_values(workers, seed, clogged)
-    swept = plan(scene, vary, folder, overrides, points, unset, samples, seed)
+    swept = plan(scene, vary, folder, overrides, points=points, unset=unset, samples=samples,
+                 seed=seed)
     with ready(scheduler, min(workers or pool.cores(), len(swept.points))) as run_points:
         for point in swept.points if scheduler is None else ():
             require_packages(point.scene)
         return run_plan(swept, run_points, clogged, progress, tell)
 
 
-def plan(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Overrides, points: Any,
-         unset: Sequence[str], samples: int | None, seed: int) -> Sweep:
+def plan(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Overrides, *,
+         points: Any, unset: Sequence[str], samples: int | None, seed: int) -> Sweep:
     """Make and check the runs of :func:`sweep`, which has these arguments; writes nothing."""
     refuse_exchanged(scene)
     factors = [design.parse(text) for text in vary]
@@ -239,7 +240,7 @@ def plan(scene: Source, vary: Sequence[str], folder: str | Path, overrides: Over
         combinations = (design.grid(factors) if samples is None
                         else design.latin(factors, samples, seed))
     named = "run" if points is None else f"{own_points.origin(points)}: row"
-    runs = design.points(scene, list(overrides), factors, combinations, unset, named)
+    runs = design.points(scene, list(overrides), factors, combinations, unset=unset, origin=named)
     return Sweep(Path(folder), label(scene), factors, runs)
 
 

@@ -1591,8 +1591,8 @@ MUTANTS = (
         ("sweep-ignores-unset",
          "A sweep ignores --unset.",
          "plan",
-         "design.points(scene, list(overrides), factors, combinations, unset, named)",
-         "design.points(scene, list(overrides), factors, combinations, (), named)",
+         "design.points(scene, list(overrides), factors, combinations, unset=unset, origin=named)",
+         "design.points(scene, list(overrides), factors, combinations, unset=(), origin=named)",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect")),
     *changes(
         "repro/sweeps/table.py",
@@ -1639,8 +1639,8 @@ MUTANTS = (
         ("text-of-value",
          "A scene of a sweep has only six digits of the numbers in its table.",
          "Factor.text",
-         "number = value if isinstance(value, str) else repr(value)",
-         'number = value if isinstance(value, str) else repr(float(f"{value:.6g}"))',
+         'f"{value} {self.unit}"',
+         'f"{value:.6} {self.unit}"',
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect")),
     *changes(
         "repro/report/comparison.py",
