@@ -117,16 +117,13 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported on first use: importing the solver takes half a
     #: second.
-    _MODULES = {"Detachment": "march.ends", "Fold": "march.folding",
-                "Meeting": "march.ends", "OutputError": "errors",
-                "PoreEnd": "march.ends", "Results": "results.tables",
-                "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
-                "Steady": "march.ends",
-                "added_resistance": "network.throats", "check": "preflight.checked",
-                "compare": "report", "error": "preflight.refined",
-                "load_run": "runs.scripts", "load_scene": "scene",
-                "resume": "runs.scripts", "run": "runs.scripts", "simulate": "march.simulation",
-                "solve": "results.tables", "sweep": "sweeps.driver", "uptake": "network.throats"}
+    _MODULES = {name: module for module, names in {
+        "errors": "OutputError SimulationError", "scene": "Scene SceneError load_scene",
+        "march.ends": "Detachment Meeting PoreEnd Steady", "march.folding": "Fold",
+        "march.simulation": "simulate", "results.tables": "Results solve",
+        "preflight.checked": "check", "preflight.refined": "error", "report": "compare",
+        "network.throats": "added_resistance uptake", "runs.scripts": "load_run resume run",
+        "sweeps.driver": "sweep"}.items() for name in names.split()}
 
     def __getattr__(name: str):
         if name == "__version__":

@@ -48,7 +48,28 @@ class SceneCheck:
     outlook: Outlook | None = None
 
     def __str__(self) -> str:
-        return report(self)
+        lines = [f"{self.scene}: can be run", "", "Model"]
+        for section, words in self.modelled:
+            lines += textwrap.wrap(words, WIDTH, initial_indent=f"  {section:12}",
+                                   subsequent_indent=" " * 14)
+        nodes = f"about {self.nodes}" if self.estimated else f"{self.nodes}"
+        lines += ["", f"Mesh at t = 0: {nodes} nodes, {self.triangles} triangles", ""]
+        outlook = self.outlook
+        lines += _cost(self.cost)
+        if outlook:
+            heading = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
+            reason = outlook.stopped or "the end of the run"
+            lines += ["", *textwrap.wrap(f"{heading}: to t = {outlook.time:.4g} h: {reason}", WIDTH,
+                                         subsequent_indent="  ")]
+        if outlook and outlook.contact is not None:
+            lines += [f"  contact with the opposite wall from t = {outlook.contact:.3g} h on"]
+        if self.numbers:
+            lines += ["", *_numbers(self.numbers, outlook)]
+        lines += [""] if self.warnings else ["", "All checked simplifications hold."]
+        for caveat in self.warnings:
+            lines += textwrap.wrap(f"WARNING {caveat.key}: {caveat.text}.", WIDTH + 2,
+                                   subsequent_indent="  ")
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
         return (f"<Check of {self.scene}: it can be run, {len(self.warnings)} warnings, "
@@ -140,32 +161,6 @@ def _mesh_size(scene: Scene, estimated: bool) -> tuple[int, int]:
         return nodes, round(nodes / PER_TRIANGLE[scene.numerics.scheme.order])
     mesh = seeded(scene).mesh
     return len(mesh.points), len(mesh.biomass)
-
-
-def report(checked: SceneCheck) -> str:
-    """Format a check as text."""
-    lines = [f"{checked.scene}: can be run", "", "Model"]
-    for section, words in checked.modelled:
-        lines += textwrap.wrap(words, WIDTH, initial_indent=f"  {section:12}",
-                               subsequent_indent=" " * 14)
-    nodes = f"about {checked.nodes}" if checked.estimated else f"{checked.nodes}"
-    lines += ["", f"Mesh at t = 0: {nodes} nodes, {checked.triangles} triangles", ""]
-    outlook = checked.outlook
-    lines += _cost(checked.cost)
-    if outlook:
-        heading = f"Outlook of a coarse run (preset sketch, {outlook.seconds:.1f} s)"
-        reason = outlook.stopped or "the end of the run"
-        lines += ["", *textwrap.wrap(f"{heading}: to t = {outlook.time:.4g} h: {reason}", WIDTH,
-                                     subsequent_indent="  ")]
-    if outlook and outlook.contact is not None:
-        lines += [f"  contact with the opposite wall from t = {outlook.contact:.3g} h on"]
-    if checked.numbers:
-        lines += ["", *_numbers(checked.numbers, outlook)]
-    lines += [""] if checked.warnings else ["", "All checked simplifications hold."]
-    for caveat in checked.warnings:
-        lines += textwrap.wrap(f"WARNING {caveat.key}: {caveat.text}.", WIDTH + 2,
-                               subsequent_indent="  ")
-    return "\n".join(lines)
 
 
 def _cost(estimate: Cost) -> Iterator[str]:

@@ -17,6 +17,7 @@ from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
 from repro.model.meshing import MOST_REFINED
 from repro.polling import OutOfTime, poll, within
+from repro.preflight.checked import WIDTH
 from repro.preflight.memory import require_memory, require_outline
 from repro.results import names
 from repro.scene import FINER, PRESETS, Scene, SceneError, Source, label, load_scene
@@ -31,7 +32,6 @@ FACTOR = 1.5
 FACTORS = {"refinement": FACTOR, "tolerance": FACTOR**-2, "contact_elements": FACTOR}
 #: Intervals between rows, if the scene requests no times.
 INTERVALS = 24
-WIDTH = 110
 #: Digits of the times (h) of common rows.
 DIGITS = 9
 

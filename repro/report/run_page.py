@@ -137,10 +137,10 @@ def _charts(run: Run) -> str:
 
 
 def _numbers(run: Run) -> str:
-    """The first and the last row."""
+    """The first and the last row; empty without rows."""
     if not len(run.times):
-        return page.section("Numbers", "<p>The run has no row: it stopped before the first.</p>")
-    ends = [0, -1] if len(run.times) > 1 else [0]
+        return ""
+    ends = [0, -1][:len(run.times)]
     rows = []
     for name, series in run.series.items():
         values = series[ends]
