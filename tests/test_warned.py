@@ -56,7 +56,7 @@ def test_the_page_has_the_warnings_at_its_head(tmp_path, checked, recwarn):
     text = text_of(tmp_path)
     Page(text)
     head, rest = text.split("</header>")
-    items = [html.unescape(re.sub("<.*?>", "", item)) for item in re.findall("<li>(.*?)</li>", head)]
+    items = [html.unescape(re.sub("<.*?>", "", item)) for item in re.findall("<li>(Warning.*?)</li>", head)]
     assert items == [f"Warning: {warning['key']}: {warning['text']}" for warning in checked]
     assert "warnings" not in rest.partition("Also recorded")[2]
 
