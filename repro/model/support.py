@@ -42,7 +42,8 @@ class Support:
         before they are strained."""
         nodes = edges.shape[1]
         _, slopes = edge_functions(nodes, np.linspace(0, 1, nodes))
-        lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * ELEMENTS[nodes - 1].edge_weights
+        weights = ELEMENTS[nodes - 1].edge_weights
+        lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * weights
         load = np.bincount(edges.ravel(), lengths.ravel(), len(reference))
         return Support(point, load / load.sum())
 
