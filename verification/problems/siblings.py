@@ -74,7 +74,7 @@ def draw_sibling(number: int) -> Sibling:
 
 #: Pairs that face each other: their number, the sum of both radii and that of the smaller one over the width and the
 #: sum, and the shift along the pore over the smaller radius.
-PAIR_SEED, PAIRS = 47, 24
+PAIR_SEED, PAIRS = 47, 12
 FILLED, SMALLER, SHIFT = (0.55, 0.9), (0.3, 0.5), (0.0, 1.0)
 PAIR_KINDS = ((), ("growth.wall=bonded",))
 
