@@ -217,7 +217,7 @@ def quadratures_apart(scene, pore, state):
     """Relative difference of the donor's uptake (8) between two quadratures; the density is linear in a triangle."""
     space, body = pore.space, pore.mesh.biomass
     places, weights = rule_with(pore.active.shape[1])
-    finer, finer_weights = rule(elements.DEGREES[space.order] + transport.FINER)
+    finer, finer_weights = rule(elements.ELEMENTS[space.order].degree + transport.FINER)
     area = [np.linalg.det(jacobians(pore.mesh.points, pore.mesh.cells[body], each)) for each in (places, finer)]
     linear = [np.column_stack([np.ones(len(each)), each]) for each in (places, finer)]
     density = pore.active / (area[0] * weights)

@@ -335,9 +335,11 @@ def test_the_modelled_physics_follow_the_sections():
 def test_check_describes_what_leaves_and_when_a_run_ends_early():
     """Nothing of it is said of a scene without it."""
     leaving = ["growth.bonding_strength=1e-3 MPa", "growth.after_detachment=continue", "growth.until=steady"]
-    pair = [FAST, 'aggregate=[{radius="5 um"}, {radius="5 um", wall="upper"}]', "growth.meeting=weld"]
+    pair = [FAST, 'aggregate=[{radius="5 um"}, {radius="5 um", wall="upper"}]']
     assert "; two aggregates that meet join, and the run goes on; strain" in dict(describe_model(
         load_scene("base", pair)))["growth"]
+    assert 'aggregates that meet end the run, because growth.meeting is "end"' in dict(describe_model(
+        load_scene("base", [*pair, "growth.meeting=end"])))["growth"]
     words = dict(describe_model(load_scene("base", leaving)))["growth"]
     assert "; an aggregate that detaches leaves the pore, and the run goes on; it ends early if the aggregates are " \
         "steady; strain" in words and "erode" not in words

@@ -1,5 +1,5 @@
 """Two aggregates that meet and weld: their outlines, one step against a plane of symmetry, masses, the strain of each
-side, resume and refusals. The case coupling-weld follows the mirror image until more of the pore is welded."""
+side, resume, and scenes without a weld. The case coupling-weld follows the mirror image further."""
 
 from dataclasses import replace
 from functools import cache
@@ -21,7 +21,7 @@ END = 0.5
 COMMON = ("numerics.preset=fast", f'growth.end="{END} h"', 'pore.length="200 um"', 'flow.mean_velocity="2.9 m/day"',
           'growth.time_step="3 min"')
 LOWER, UPPER = '{name="low", radius="13.8 um"}', '{name="high", radius="13.8 um", wall="upper"}'
-SCENE = (*COMMON, f"aggregate=[{LOWER}, {UPPER}]", f'pore.width="{WIDTH} um"', "growth.meeting=weld")
+SCENE = (*COMMON, f"aggregate=[{LOWER}, {UPPER}]", f'pore.width="{WIDTH} um"')
 HALF = (*COMMON, 'aggregate.radius="13.8 um"', f'pore.width="{WIDTH / 2} um"', 'pore.upper_wall="symmetry"')
 
 
@@ -177,16 +177,23 @@ def test_a_run_resumes_with_a_weld_to_the_last_bit(tmp_path):
     assert one == two and float(one.split(",")[0]) == 0.4
 
 
-REFUSED = {
-    ('aggregate=[{radius="5 um"}, {radius="5 um", position="40 um"}]',): "unless there are two aggregates on opposite",
-    ('aggregate={radius="5 um"}',): "unless there are two aggregates on opposite walls",
-    ("numerics.preset=paper",): 'without the curved elements and the midpoint rule of numerics.preset = "fast"',
-    ("growth.fluid_forces=included",): 'with growth.fluid_forces = "included"',
-    ("growth.new_biomass=stress_free", 'growth.erosion.speed="0.1 um/h"'): "with [growth.erosion]"}
+#: Changes of SCENE with which aggregates do not join, and the reason in the message of the run's end.
+WITHOUT = {
+    "chosen": (["growth.meeting=end"], 'growth.meeting is "end"'),
+    "one wall": (['aggregate=[{radius="5 um"}, {radius="5 um", position="40 um"}]'], "only two aggregates on opposite"),
+    "alone": (['aggregate={radius="5 um"}'], "only two aggregates on opposite walls can join"),
+    "paper": (["numerics.preset=paper"], "a weld needs the curved elements and the midpoint rule of the preset fast"),
+    "forces": (["growth.fluid_forces=included"], 'growth.fluid_forces is "included"'),
+    "erosion": (["growth.new_biomass=stress_free", 'growth.erosion.speed="0.1 um/h"'], "the aggregates erode")}
 
 
-@pytest.mark.parametrize("changes, part", REFUSED.items(), ids=["one wall", "alone", "paper", "forces", "erosion"])
-def test_a_weld_that_is_not_modelled_is_refused(changes, part):
-    with pytest.raises(repro.SceneError) as error:
-        load_scene("base", [*SCENE, *changes], unset=["flow.head"])
-    assert part in str(error.value) and "\n" not in str(error.value)
+@pytest.mark.parametrize("changes, reason", WITHOUT.values(), ids=WITHOUT)
+def test_a_scene_says_why_its_aggregates_do_not_join(changes, reason):
+    assert load_scene("base", SCENE, unset=["flow.head"]).without_weld == ""
+    assert reason in load_scene("base", [*SCENE, *changes], unset=["flow.head"]).without_weld
+
+
+def test_a_meeting_without_a_weld_ends_the_run_with_the_reason():
+    scene = load_scene("base", [*SCENE, "growth.fluid_forces=included"], unset=["flow.head"])
+    with pytest.raises(repro.Meeting, match='2 um; growth.fluid_forces is "included"'):
+        list(repro.simulate(scene))

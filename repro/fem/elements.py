@@ -13,18 +13,37 @@ from functools import cache
 
 import numpy as np
 from skfem import ElementTriP1, ElementTriP2
+from skfem.element import ElementH1
 from skfem.quadrature import get_quadrature_line, get_quadrature_tri
 
-ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2()}
-#: Degrees of the quadrature on triangles and on edges, by order: products of two functions and a
-#: coefficient that is nearly linear.
-DEGREES = {1: 2, 2: 6}
-#: Degrees for gradients: lower for linear functions on straight triangles, where they are constant.
-GRADIENT_DEGREES = {1: 1, 2: 6}
 #: The corner at the other end of the edges 01, 12 and 20.
 NEXT = [1, 2, 0]
-#: Shape functions of an edge among those of a triangle: the edge 01.
-ON_EDGE = {1: [0, 1], 2: [0, 3, 1]}
+
+
+@dataclass(frozen=True)
+class Element:
+    """The functions of an order, and the quadrature that they need.
+
+    degree: of the quadrature on triangles and on edges, for products of two functions and a
+    coefficient that is nearly linear; gradient_degree: of that for gradients, lower for linear
+    functions, whose gradients are constant; on_edge: functions of the edge 01 among those of the
+    triangle; edge_weights: of its nodes in Newton's and Cotes' rule.
+    """
+
+    functions: ElementH1
+    degree: int
+    gradient_degree: int
+    on_edge: tuple[int, ...]
+    edge_weights: tuple[float, ...]
+
+
+#: By order: linear on straight triangles, quadratic on curved ones.
+ELEMENTS = {
+    1: Element(ElementTriP1(), degree=2, gradient_degree=1, on_edge=(0, 1),
+               edge_weights=(1 / 2, 1 / 2)),
+    2: Element(ElementTriP2(), degree=6, gradient_degree=6, on_edge=(0, 3, 1),
+               edge_weights=(1 / 6, 4 / 6, 1 / 6)),
+}
 
 
 def order_of(cells: np.ndarray) -> int:
@@ -34,13 +53,13 @@ def order_of(cells: np.ndarray) -> int:
 
 def nodes(order: int) -> np.ndarray:
     """(k, 2) places of the nodes of an element on the unit triangle."""
-    return np.asarray(ELEMENTS[order].doflocs)
+    return np.asarray(ELEMENTS[order].functions.doflocs)
 
 
 def evaluated(order: int, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shape functions (q, k) at points (q, 2) of the unit triangle, and their derivatives by s and
     t, (q, k, 2)."""
-    element = ELEMENTS[order]
+    element = ELEMENTS[order].functions
     places = np.ascontiguousarray(where.T)
     count = len(element.doflocs)
     values = np.empty((len(where), count))
@@ -116,9 +135,10 @@ def linear_fit(of: Table) -> np.ndarray:
 @cache
 def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
     """(p, e) shape functions of an edge's nodes at its quadrature points, and the weights (p,)."""
-    (s,), weights = get_quadrature_line(DEGREES[order])
+    element = ELEMENTS[order]
+    (s,), weights = get_quadrature_line(element.degree)
     along = values(order, np.column_stack([s, 0 * s]))
-    return along[:, ON_EDGE[order]], weights
+    return along[:, element.on_edge], weights
 
 
 @cache
@@ -127,7 +147,7 @@ def side_table(order: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
     Also returns the weights (p,) and the derivatives (p, k) along the side.
     """
-    (s,), weights = get_quadrature_line(DEGREES[order])
+    (s,), weights = get_quadrature_line(ELEMENTS[order].degree)
     corners = nodes(1)
     direction = corners[NEXT[side]] - corners[side]
     where = corners[side] + s[:, None] * direction

@@ -421,7 +421,7 @@ class Mesh:
 
     def area(self) -> float:
         """Area of the aggregates, um2."""
-        of = elements.table(self.geometry, elements.DEGREES[self.geometry])
+        of = elements.table(self.geometry, elements.ELEMENTS[self.geometry].degree)
         return float(elements.weights(self.points[self.cells[self.biomass]], of).sum())
 
     def with_middles(self, field: np.ndarray) -> np.ndarray:
@@ -485,15 +485,13 @@ class Mesh:
     def acceptable(self) -> bool:
         """Does the mesh pass the paper's criterion (3.5), with no triangle turned over?"""
         straight = self.areas.min() > 0 and np.count_nonzero(self.quality < POOR) <= POOR_ALLOWED
-        if not straight or self.geometry == 1:
-            return bool(straight)
-        return not self.turned_over(self.topology.bent).any()
+        return bool(straight) and not self.turned_over(self.topology.bent).any()
 
 
 @cache
 def checked_map_derivatives(geometry: int) -> np.ndarray:
     """Derivatives of the maps' shape functions at a triangle's nodes and quadrature points."""
-    of = elements.table(geometry, elements.GRADIENT_DEGREES[geometry])
+    of = elements.table(geometry, elements.ELEMENTS[geometry].gradient_degree)
     at_nodes = elements.derivatives(geometry, elements.nodes(geometry))
     return np.concatenate([at_nodes, of.derivatives])
 

@@ -106,28 +106,24 @@ class Outline:
     def area(self) -> float:
         """Area inside (um2): that of the corners' polygon, and two thirds of chord times height of
         each arc."""
-        if self.geometry == 1:
-            return polygon_area(self.points)
         a, m, b = np.moveaxis(self.arcs(self.points), 1, 0)
         chord = b - a
         bow = m - 0.5 * (a + b)
         lens = bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]
-        return polygon_area(self.points[::2]) + float(2 / 3 * np.sum(lens))
+        return polygon_area(self.points[::self.geometry]) + float(2 / 3 * np.sum(lens))
 
     @cached_property
     def corners(self) -> Outline:
         """The polygon through the corners, without middles."""
-        if self.geometry == 1:
-            return self
-        return replace(self, points=self.points[::2], wall=self.wall[::2], fixed=self.fixed[::2],
-                       origin=self.origin[::2], geometry=1)
+        at = slice(None, None, self.geometry)
+        return replace(self, points=self.points[at], wall=self.wall[at], fixed=self.fixed[at],
+                       origin=self.origin[at], geometry=1)
 
     @property
     def edge_wall(self) -> np.ndarray:
         """The wall that each edge lies on; FREE where it borders the fluid."""
-        if self.geometry == 2:
-            return self.wall[1::2]
-        return np.where(self.wall == np.roll(self.wall, -1), self.wall, FREE)
+        first, middle, last = self.arcs(self.wall).T
+        return np.where((first == last) & (middle == last), last, FREE).astype(int)
 
     def edges_on(self, wall: int) -> np.ndarray:
         """(e, 2 or 3) numbers of the nodes of each edge on a wall, along the loop."""
@@ -175,8 +171,6 @@ class Outline:
     @cached_property
     def _extreme_points(self) -> np.ndarray:
         """(K, 2) um, points among which x and y have their extremes."""
-        if self.geometry == 1:
-            return self.points
         return np.concatenate([self._peaks(), self.points])
 
     def _peaks(self) -> np.ndarray:

@@ -70,7 +70,7 @@ class Space:
     @cached_property
     def table(self) -> Table:
         """The functions at the quadrature points for products."""
-        return elements.table(self.order, elements.DEGREES[self.order])
+        return elements.table(self.order, elements.ELEMENTS[self.order].degree)
 
     @cached_property
     def at(self) -> Basis:
@@ -80,7 +80,7 @@ class Space:
     @property
     def gradient_degree(self) -> int:
         """Degree of the quadrature of gradients; it has one point on straight linear triangles."""
-        return elements.GRADIENT_DEGREES[self.order]
+        return elements.ELEMENTS[self.order].gradient_degree
 
     @cached_property
     def gradient_table(self) -> Table:
@@ -211,6 +211,16 @@ class Lumped:
         """Return (t, 1) means of a field (r, 1) over the nodes of an aggregate's triangles (29)."""
         return field[region.own_cells, 0].mean(axis=1, keepdims=True)
 
+    def gain(self, region: Region, before: np.ndarray, after: np.ndarray,
+             maximum_density: float) -> np.ndarray:
+        """Return the (t, 1) factor by which an aggregate expands between two masses (r, 1).
+
+        New mass takes the area that it needs at the maximum density (X_m, mg/L).
+        """
+        dx = self.space.reaction.dx[self.rows(region)]
+        more = (after - before) / dx / maximum_density
+        return 1 + self.to_growth_points(region, more)
+
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
         """Return the same points for every degree, and the identity (1, 1) for densities."""
         return self.space.reaction, np.ones((1, 1))
@@ -260,6 +270,14 @@ class Quadrature:
         """Return an aggregate's field (r, q) itself: growth is integrated at the same points."""
         return field
 
+    def gain(self, region: Region, before: np.ndarray, after: np.ndarray,
+             maximum_density: float) -> np.ndarray:
+        """Return the (t, q) factor by which an aggregate expands between two masses (r, q).
+
+        Each point expands as its mass grows.
+        """
+        return after / before
+
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
         """Return the functions in the biomass at points of a more exact quadrature.
 
@@ -269,7 +287,7 @@ class Quadrature:
         space = self.space
         mesh = space.mesh
         biomass = mesh.biomass
-        of = elements.table(space.order, elements.DEGREES[space.order] + degrees)
+        of = elements.table(space.order, elements.ELEMENTS[space.order].degree + degrees)
         dx = elements.weights(mesh.points[mesh.cells[biomass]], of)
         fit = elements.linear_fit(space.table).T @ of.linear.T
         return Basis(space.cells[biomass], space.count, of.values, dx), fit

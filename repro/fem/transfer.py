@@ -147,7 +147,7 @@ def unfolded(mesh: Mesh, origin: np.ndarray, region: Region) -> np.ndarray:
     derivatives = checked_map_derivatives(mesh.geometry)
     while True:
         det = elements.determinant(elements.jacobian(origin[cells], derivatives))
-        bad = cells[det.min(axis=1) <= (FOLD * det.max(axis=1) if mesh.geometry == 2 else 0.0)]
+        bad = cells[det.min(axis=1) <= FOLD * det.max(axis=1)]
         if len(bad) == 0:
             return origin
         straight = origin.copy()

@@ -20,8 +20,9 @@ erosion has worn down, leaves the pore, and the run goes on. If it touches both 
 them gives way, or erosion takes a contact surface, the run ends: the model has no law for a surface
 that is set free.
 
-With growth.meeting = "weld" two aggregates that meet join (:mod:`repro.model.welding`), and the run
-goes on.
+With growth.meeting = "weld" two aggregates on opposite walls that meet join
+(:mod:`repro.model.welding`), and the run goes on, unless :attr:`repro.Scene.without_weld` says why
+they cannot.
 
 With growth.until = "steady" a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
@@ -49,8 +50,8 @@ from repro.model import adhesion
 from repro.model.adhesion import Loading, Peak
 from repro.model.pore import Pore
 from repro.model.solving import Solved
-from repro.scene import Growth, Scene, Stated, TimeTables
 from repro.scene import Pore as Channel
+from repro.scene import Scene, Stated, TimeTables
 
 #: An end is located if its margin is positive and at most this. The relative error of its time is
 #: this over d ln(stress) / d ln(t). The least numerics.tolerance of a preset is 2.5e-4.
@@ -87,7 +88,8 @@ class PoreEnd(RunEnd):
 class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
 
-    With ``growth.meeting = "weld"`` they join instead, and the run goes on.
+    With ``growth.meeting = "weld"``, the default, two aggregates on opposite walls join instead,
+    and the run goes on.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the place (um).
@@ -96,7 +98,7 @@ class Meeting(RunEnd):
     --------
     >>> import repro
     >>> changes = ['aggregate=[{radius="18 um"}, {radius="18 um", wall="upper"}]',
-    ...            'pore.width="50 um"', "numerics.preset=fast"]
+    ...            'pore.width="50 um"', "numerics.preset=fast", "growth.meeting=end"]
     >>> try:
     ...     times = [report.pore.time for report in repro.simulate("base", changes)]
     ... except repro.Meeting as end:
@@ -210,19 +212,21 @@ class Strength:
 @dataclass(frozen=True, eq=False)
 class Ends:
     """Data from which the ends of a run follow; None for strengths that the scene leaves out.
-    tables: over time, before whose last time no state is steady."""
+    tables: over time, before whose last time no state is steady; without_weld: as
+    :attr:`repro.Scene.without_weld`."""
 
     channel: Channel
     loading: Loading
     bonding: Strength | None
     tensile: Strength | None
     tables: TimeTables
+    without_weld: str
 
     @classmethod
     def of(cls, scene: Scene) -> Ends:
         """The ends of a scene with growth."""
         return cls(scene.pore, Loading.of(scene), Strength.of(scene, "bonding_strength"),
-                   Strength.of(scene, "tensile_strength"), scene.time_tables)
+                   Strength.of(scene, "tensile_strength"), scene.time_tables, scene.without_weld)
 
 
 def nearest_end(ends: Ends, pore: Pore, solved: Solved, start: Pore | None = None) -> Event:
@@ -266,7 +270,7 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
         compression = most_compressed(Compression(), pore)
         fold = Fold(fold_message(f"at t = {pore.time:g} h", compression))
         yield Event(pore.biot / compression.stretch - 1, fold)
-    yield from _meetings(ends.loading.growth, pore)
+    yield from _meetings(ends, pore)
     if ends.loading.growth.erosion:
         yield from _eroded(ends.loading.growth.minimum_film, pore)
     if ends.bonding is not None:
@@ -290,14 +294,14 @@ def _eroded(least: float, pore: Pore) -> Iterator[Event]:
         yield Event(least / extent - 1, end, None if body.spans else number)
 
 
-def _meetings(growth: Growth, pore: Pore) -> Iterator[Event]:
+def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
     """The events of all pairs of aggregates that are not welded."""
-    least = growth.minimum_film
+    least = ends.loading.growth.minimum_film
     for pair, film, (x, y) in _films(pore):
         end = Meeting(f"{pair} meet at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the "
                       f"film between them is {film:.3g} um, and it closes below "
-                      f"growth.minimum_film, {least:g} um; no model follows")
-        yield Event(1 - film / least, end, joins=growth.welds)
+                      f"growth.minimum_film, {least:g} um; {ends.without_weld}")
+        yield Event(1 - film / least, end, joins=not ends.without_weld)
 
 
 def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:

@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.fem.mesh import Region
-from repro.fem.space import Space
 from repro.model.pore import Pore
 
 
@@ -27,32 +25,13 @@ def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> tuple[
         Expansion of each aggregate since t = 0. On curved triangles it grows with the mass at each
         point.
     """
-    gain = GAINS[previous.space.order]
     expansions = []
     for body, after, region in zip(previous.bodies, grown.bodies, previous.mesh.regions):
         before = body.active + body.inert
         total = after.active + after.inert
-        factor = gain(previous.space, region, before, total, maximum_density)
-        expansions.append(body.theta * factor)
+        gain = previous.space.integration.gain(region, before, total, maximum_density)
+        expansions.append(body.theta * gain)
     return tuple(expansions)
-
-
-def _gain_of_mass(space: Space, region: Region, before: np.ndarray, total: np.ndarray,
-                  maximum_density: float) -> np.ndarray:
-    """(t, q) factor on theta: that of the mass at each point."""
-    return total / before
-
-
-def _gain_of_area(space: Space, region: Region, before: np.ndarray, total: np.ndarray,
-                  maximum_density: float) -> np.ndarray:
-    """(t, 1) factor on theta, from the area that the new mass needs at X_m (mg/L)."""
-    dx = space.reaction.dx[space.integration.rows(region)]
-    more = (total - before) / dx / maximum_density
-    return 1 + space.integration.to_growth_points(region, more)
-
-
-#: Growth of theta in a step, by the order of the functions.
-GAINS = {1: _gain_of_area, 2: _gain_of_mass}
 
 
 def with_restarted_theta(pore: Pore, maximum_density: float) -> Pore:

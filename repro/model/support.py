@@ -22,10 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from repro.fem.elements import ELEMENTS
 from repro.fem.outline import edge_functions
-
-#: (k,) weights of the k nodes: the trapezoidal rule, or Simpson's.
-WEIGHTS = {2: np.array([1.0, 1.0]) / 2, 3: np.array([1.0, 4.0, 1.0]) / 6}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +42,8 @@ class Support:
         before they are strained."""
         nodes = edges.shape[1]
         _, slopes = edge_functions(nodes, np.linspace(0, 1, nodes))
-        lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * WEIGHTS[nodes]
+        weights = ELEMENTS[nodes - 1].edge_weights
+        lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * weights
         load = np.bincount(edges.ravel(), lengths.ravel(), len(reference))
         return Support(point, load / load.sum())
 

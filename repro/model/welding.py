@@ -22,6 +22,7 @@ import numpy as np
 from repro.errors import GrowthError, LinearError
 from repro.fem import welds
 from repro.fem.forms import Basis, basis
+from repro.fem.mesh import Mesh
 from repro.fem.walls import FREE, WELD
 from repro.model import growth, remeshing
 from repro.model.closing_by_nodes import closing_nodes
@@ -135,6 +136,37 @@ def _along_arcs(nodes: np.ndarray) -> np.ndarray:
     return np.concatenate([nodes[None, 0].swapaxes(0, 1), points], axis=1)
 
 
+@dataclass(frozen=True, eq=False)
+class Union:
+    """The nodes of all aggregates, those of a tied pair once.
+
+    nodes: (n,) of the mesh, ascending; number: (N,) place of each node of the mesh, or of the node
+    to which it is tied, among them; cells: (t, k) triangles in their numbering; corners: number of
+    corners among them.
+    """
+
+    nodes: np.ndarray
+    number: np.ndarray
+    cells: np.ndarray
+    corners: int
+
+    @staticmethod
+    def of(mesh: Mesh, tied: np.ndarray) -> Union:
+        """The union of a mesh's aggregates with pairs (k, 2) that are tied."""
+        alias = np.arange(len(mesh.points))
+        alias[tied[:, 1]] = tied[:, 0]
+        cells = alias[mesh.cells[mesh.biomass]]
+        nodes, own_cells = np.unique(cells, return_inverse=True)
+        return Union(nodes, np.searchsorted(nodes, alias), own_cells.reshape(cells.shape),
+                     int(np.count_nonzero(nodes < mesh.corners)))
+
+    def summed(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """(n, ...) sums of values (k, ...) at nodes (k,) of the mesh; zero elsewhere."""
+        total = np.zeros((len(self.nodes), *values.shape[1:]))
+        np.add.at(total, self.number[nodes], values)
+        return total
+
+
 @dataclass(eq=False)
 class Welding:
     """Closing of the film between two aggregates that are welded, or that have met.
@@ -220,53 +252,61 @@ class Welding:
         their nodes."""
         grown = self.grown
         mesh = grown.mesh
-        alias = np.arange(len(mesh.points))
-        alias[tied[:, 1]] = tied[:, 0]
-        cells = alias[mesh.cells[mesh.biomass]]
-        nodes, own_cells = np.unique(cells, return_inverse=True)
-        number = np.searchsorted(nodes, alias)
-        corners = int(np.count_nonzero(nodes < mesh.corners))
-        prescribed = np.zeros((len(mesh.points), 2), bool)
-        target = shape.mesh.points.copy()
-        reference = mesh.points.copy()
-        in_triangles, thetas = [], []
-        supports: list[Support] = []
-        for k, region in enumerate(mesh.regions):
-            solid, theta = grown.bodies[k].strained
-            in_triangles.append(solid.reference[region.own_cells])
-            thetas.append(theta)
-            reference[region.nodes] = solid.reference
-            seen = shape.focused(k)
-            locked, places = constraints(grown.focused(k), seen)
-            prescribed[region.nodes] |= locked
-            target[region.nodes] = np.where(locked, places, target[region.nodes])
-            for support in surface_supports(solid, seen):
-                load = np.zeros(len(nodes))
-                np.add.at(load, number[region.nodes], support.load)
-                supports.append(Support(int(number[region.nodes[support.point]]), load))
+        union = Union.of(mesh, tied)
+        prescribed, target = self._prescribed(shape)
         if placed is not None:
             prescribed[placed] = True
             target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
-        solid = WeldedSolid(
-            Shape(own_cells.reshape(cells.shape), corners, grown.space.gradient_degree,
-                  mesh.topology.method), reference[nodes], energy=grown.bodies[0].solid.energy,
-            in_triangles=mesh.by_triangle(in_triangles))
-        forces = None
-        if self.forces is not None:
-            forces = np.zeros((len(nodes), 2))
-            np.add.at(forces, number[mesh.body], self.forces)
+        forces = None if self.forces is None else union.summed(mesh.body, self.forces)
+        nodes = union.nodes
         rest = growth.equilibrium(
-            solid, mesh.by_triangle(thetas), shape.mesh.points[nodes],
-            shape.pressure[nodes[:corners]], prescribed[nodes], target[nodes], forces=forces,
-            supports=supports,
+            self._solid(union), mesh.by_triangle([body.strained[1] for body in grown.bodies]),
+            shape.mesh.points[nodes], shape.pressure[nodes[: union.corners]], prescribed[nodes],
+            target[nodes], forces=forces, supports=self._supports(shape, union),
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
         points = shape.mesh.points.copy()
-        points[mesh.body] = rest.position[number[mesh.body]]
+        points[mesh.body] = rest.position[union.number[mesh.body]]
         pressure = shape.pressure.copy()
-        body_corners = mesh.topology.body_corners
-        pressure[body_corners] = rest.pressure[number[body_corners]]
+        corners = mesh.topology.body_corners
+        pressure[corners] = rest.pressure[union.number[corners]]
         return replace(shape.moved(points), pressure=pressure)
+
+    def _solid(self, union: Union) -> WeldedSolid:
+        """The welded aggregates, each triangle in the reference of its own one."""
+        mesh = self.grown.mesh
+        reference = mesh.points.copy()
+        in_triangles = []
+        for region, body in zip(mesh.regions, self.grown.bodies):
+            own = body.strained[0].reference
+            in_triangles.append(own[region.own_cells])
+            reference[region.nodes] = own
+        shape = Shape(union.cells, union.corners, self.grown.space.gradient_degree,
+                      mesh.topology.method)
+        return WeldedSolid(shape, reference[union.nodes], energy=self.grown.bodies[0].solid.energy,
+                           in_triangles=mesh.by_triangle(in_triangles))
+
+    def _prescribed(self, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 2) True where a wall prescribes a coordinate of a node, and (N, 2) um, the places of
+        the nodes with these coordinates."""
+        mesh = self.grown.mesh
+        prescribed = np.zeros((len(mesh.points), 2), bool)
+        target = shape.mesh.points.copy()
+        for number, region in enumerate(mesh.regions):
+            locked, places = constraints(self.grown.focused(number), shape.focused(number))
+            prescribed[region.nodes] |= locked
+            target[region.nodes] = np.where(locked, places, target[region.nodes])
+        return prescribed, target
+
+    def _supports(self, shape: Pore, union: Union) -> list[Support]:
+        """The supports of all contact surfaces."""
+        supports = []
+        for number, region in enumerate(self.grown.mesh.regions):
+            solid, _ = self.grown.bodies[number].strained
+            supports += [Support(int(union.number[region.nodes[support.point]]),
+                                 union.summed(region.nodes, support.load))
+                         for support in surface_supports(solid, shape.focused(number))]
+        return supports
 
     def _closing(self, shape: Pore, number: int) -> np.ndarray:
         """(M,) wall that each node of an aggregate must join next, or FREE; whole arcs join."""

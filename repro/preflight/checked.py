@@ -24,8 +24,6 @@ from repro.scene.units import SceneError
 WIDTH = 110
 #: Largest mesh (nodes) that a check generates. For a larger one it estimates the nodes.
 MOST_MESHED = 20_000
-#: Nodes per triangle, by the order of the elements.
-PER_TRIANGLE = {1: 0.5, 2: 2.0}
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,7 @@ def _mesh_size(scene: Scene, estimated: bool) -> tuple[int, int]:
     """Nodes and triangles of the first mesh."""
     if estimated:
         nodes = round(first_nodes(scene))
-        return nodes, round(nodes / PER_TRIANGLE[scene.numerics.scheme.order])
+        return nodes, round(2 * nodes / scene.numerics.scheme.order**2)
     mesh = seeded(scene).mesh
     return len(mesh.points), len(mesh.biomass)
 

@@ -41,8 +41,6 @@ from repro.scene.rules import FINEST
 PER_NODE = 25e3
 #: Bytes of a run that do not depend on its mesh.
 LEAST = 30e6
-#: Nodes of six-node triangles per corner.
-PER_CORNER = 4.0
 #: The largest mesh of a run over its first one. Of 100 pores of verification/problems/family.py,
 #: in coarse runs past contact, it is at most 5.1. A longer pore may need more.
 GROWTH = 5.1
@@ -113,7 +111,7 @@ def _nodes(scene: Scene, extent: float, surface: list[tuple[float, float]]) -> f
             thickness = (largest - near) / numerics.gradation
             corners += 2 * piece / HEXAGON * ((1 / near - 1 / largest) / numerics.gradation
                                               - thickness / largest**2)
-    return float(corners) * (PER_CORNER if numerics.scheme.order == 2 else 1.0)
+    return float(corners) * numerics.scheme.order**2
 
 
 def expected_bytes(scene: Scene, growth: float | None = None) -> float:

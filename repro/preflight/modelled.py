@@ -138,8 +138,10 @@ def _growth(scene: Scene) -> Iterator[str]:
             yield f"{key.replace('_', ' ')} {scene_tables(scene)['growth'][key]}"
     if growth.continues:
         yield "an aggregate that detaches leaves the pore, and the run goes on"
-    if growth.welds:
-        yield "two aggregates that meet join, and the run goes on"
+    if len(scene.aggregates) > 1:
+        reason = scene.without_weld
+        yield (f"aggregates that meet end the run, because {reason}" if reason else
+               "two aggregates that meet join, and the run goes on")
     if growth.erosion:
         yield f"free surfaces erode, by the law {growth.erosion.law}"
     if growth.until_steady:

@@ -384,8 +384,10 @@ class Growth:
         LIMITING, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
         about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
     meeting: str = choice(
-        "end", "weld", source="Section 5, without a model",
-        about="Two aggregates that meet end the run, or join and share their motion from then on")
+        "weld", "end", source="Section 5, without a model",
+        about="Two aggregates that meet join and share their motion from then on, or end the run. "
+              "A weld needs two of them on opposite walls, curved elements, and neither erosion nor "
+              "fluid forces; otherwise a meeting ends the run")
     until: str = choice(
         "end", "steady",
         about="The run goes on to end, or ends early if the aggregates are steady")
@@ -406,11 +408,6 @@ class Growth:
     def continues(self) -> bool:
         """Whether an aggregate that detaches leaves the pore, and the run goes on."""
         return self.after_detachment == "continue"
-
-    @property
-    def welds(self) -> bool:
-        """Whether two aggregates that meet join."""
-        return self.meeting == "weld"
 
     @property
     def until_steady(self) -> bool:
@@ -620,6 +617,21 @@ class Scene:
         return GrowingSections(self.substrates, self.kinetics, self.growth)
 
     @property
+    def without_weld(self) -> str:
+        """Why aggregates that meet end the run; empty if they join."""
+        growth = self.growing.growth
+        scheme = self.numerics.scheme
+        opposite = sorted(seed.wall for seed in self.aggregates) == ["lower", "upper"]
+        reasons = {
+            'growth.meeting is "end"': growth.meeting == "end",
+            "only two aggregates on opposite walls can join": not opposite,
+            "a weld needs the curved elements and the midpoint rule of the preset fast":
+                not (scheme.controls_error and scheme.follows_layers),
+            'growth.fluid_forces is "included"': growth.has_fluid_forces,
+            "the aggregates erode": growth.erosion is not None}
+        return next((reason for reason, applies in reasons.items() if applies), "")
+
+    @property
     def stagnant(self) -> bool:
         """Whether there are substrates without flow, at any time."""
         if self.substrates is None or self.flow is None:
@@ -677,7 +689,7 @@ LATER: dict[str, dict[str, object]] = {
     "pore": {"upper_wall": "no slip"},
     "aggregate": {"position": "0.0 um", "wall": "lower", "smooth": False, "inert_fraction": 0.0},
     "growth": {"wall": "sliding", "energy": "neo-Hookean", "limiting_invariant": 100.0,
-               "after_detachment": "end", "meeting": "end", "until": "end",
+               "after_detachment": "end", "meeting": "weld", "until": "end",
                "steady_tolerance": STEADY},
     "numerics": {"contact_elements": 0.0},
     "substrates.donor": {"inhibition_constant": "100.0 mg/L"},

@@ -309,8 +309,6 @@ def _growth_rules(scene: "Scene", growth: "Growth") -> Rules:
         "growth.bonding_strength": 'needed with growth.after_detachment = "continue"'}
     yield growth.energy != "Gent" and growth.limiting_invariant != LIMITING, _only_with(
         "growth.limiting_invariant", "growth.energy", "Gent")
-    if growth.welds:
-        yield from _weld_rules(scene, growth)
     if growth.erosion:
         yield from _erosion_rules(scene, growth, growth.erosion)
     yield from _mirrored_rules(growth, scene.pore.upper_wall)
@@ -325,26 +323,6 @@ def _growth_rules(scene: "Scene", growth: "Growth") -> Rules:
     yield film >= scene.pore.width, {
         "growth.minimum_film": f"less than pore.width ({scene.pore.width:g} um) is needed",
         "pore.width": f"more than growth.minimum_film ({film:g} um) is needed"}
-
-
-def _weld_rules(scene: "Scene", growth: "Growth") -> Rules:
-    """Rules of the weld, which joins two aggregates on opposite walls."""
-    weld = 'growth.meeting = "weld"'
-    opposite = [seed.wall for seed in scene.aggregates] in (["lower", "upper"], ["upper", "lower"])
-    yield not opposite, {
-        "growth.meeting": '"end" is needed unless there are two aggregates on opposite walls; more '
-                          "of them, or two on one wall, would enclose water"}
-    scheme = scene.numerics.scheme
-    yield not (scheme.controls_error and scheme.follows_layers), {
-        "growth.meeting": '"end" is needed without the curved elements and the midpoint rule of '
-                          'numerics.preset = "fast"',
-        "numerics.preset": f'"fast", "accurate" or "exact" is needed with {weld}'}
-    yield growth.has_fluid_forces, {
-        "growth.meeting": '"end" is needed with growth.fluid_forces = "included"',
-        "growth.fluid_forces": f'"neglected" is needed with {weld}'}
-    yield growth.erosion is not None, {
-        "growth.meeting": '"end" is needed with [growth.erosion]',
-        "growth.erosion": 'growth.meeting = "end" is needed with it'}
 
 
 #: The key that each law of erosion needs.

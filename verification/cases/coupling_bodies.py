@@ -161,7 +161,7 @@ def test_meeting(preset, record):
     Norm: relative difference of the film from the least film.
     """
     scene = load_scene("base", [with_preset(preset), 'growth.end="40 h"', 'growth.minimum_film="6 um"',
-                                'aggregate=[{radius="15 um"}, {radius="15 um", wall="upper"}]'])
+                                'aggregate=[{radius="15 um"}, {radius="15 um", wall="upper"}]', "growth.meeting=end"])
     reports = []
     with pytest.raises(Meeting):
         reports.extend(simulate(scene))
@@ -213,7 +213,7 @@ def _weld_scene(preset: str, pore: str):
     times = [f"{hour} h" for hour in WELDED]
     seed = 'radius="13.8 um"'
     of = {"half": ['pore.width="15 um"', 'pore.upper_wall="symmetry"', f"aggregate={{{seed}}}"],
-          "whole": ['pore.width="30 um"', f'aggregate=[{{{seed}}}, {{{seed}, wall="upper"}}]', "growth.meeting=weld"]}
+          "whole": ['pore.width="30 um"', f'aggregate=[{{{seed}}}, {{{seed}, wall="upper"}}]']}
     return load_scene("base", [
         with_preset(preset), f'growth.end="{WELDED[-1]} h"', f"output.times={times}", f'pore.length="{SHORT} um"',
         'flow.mean_velocity="2.9 m/day"', *of[pore]], unset=["flow.head"])

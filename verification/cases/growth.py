@@ -292,7 +292,7 @@ def _stress():
     F, P, G = _near_one()
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     numbers = np.arange(3 * len(F))
-    shape = Shape(numbers.reshape(-1, 3), len(numbers), elements.GRADIENT_DEGREES[1])
+    shape = Shape(numbers.reshape(-1, 3), len(numbers), elements.ELEMENTS[1].gradient_degree)
     body = Supported(shape, np.tile(corners, (len(F), 1)), np.zeros((len(numbers), 2), bool))
     place, move = ((corners @ matrix.mT).reshape(-1, 2) for matrix in (F, G))
     _, forces, _ = _along(body, body.constant(1.0), place, np.repeat(P, 3), move, body.resting)

@@ -24,11 +24,13 @@ from verification.evidence.checks import Check, at_most
 from verification.problems import hostile
 from verification.problems.hard import TooLong, limited
 
-#: Processor time (s) of one run: a hundred times the median.
+#: Processor time (s) of one run for each aggregate: a hundred times the median.
 LIMIT = 30.0
+#: Members, of which the last 30 have several aggregates.
+MEMBERS = 220
 #: Cheap members, in ``make test``. ``make verify`` runs the others too.
-QUICK = (0, 2, 3, 6, 8, 9, *range(164, 171))
-REST = tuple(seed for seed in range(190) if seed not in QUICK)
+QUICK = (0, 2, 3, 6, 8, 9, *range(164, 171), 191, 204)
+REST = tuple(seed for seed in range(MEMBERS) if seed not in QUICK)
 #: Checks that are not judged. By zero order the growth of 172 jumps at a front in the aggregate, on which ``fast``
 #: puts a few elements: its thickness is wrong by 0.2 %, and the head loss of the film above it, a sixth of the width,
 #: by 1.6 %.
@@ -85,8 +87,9 @@ def _outcome(tables: dict, folder: Path) -> Outcome:
     """Run a scene. One that takes too long counts as refused. Any other exception propagates."""
     refusal = ""
     try:
-        with limited(LIMIT):
-            run(load_scene(tables), folder)
+        scene = load_scene(tables)
+        with limited(LIMIT * len(scene.aggregates)):
+            run(scene, folder)
     except (SceneError, SimulationError, TooLong) as failure:
         refusal = str(failure)
     files = run_files.Run(folder, tables) if (folder / "timeseries.csv").is_file() else None

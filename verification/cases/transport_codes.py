@@ -304,7 +304,7 @@ def mass(space: Space) -> np.ndarray:
     if space.order == 1:
         return np.diag(space.lumped())
     grid = space.mesh.fem
-    basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order], intorder=8)
+    basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order].functions, intorder=8)
     _, nodes = cKDTree(basis.doflocs.T).query(space.points)
     return poisson.mass.assemble(basis).toarray()[np.ix_(nodes, nodes)]
 

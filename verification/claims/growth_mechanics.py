@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from skfem import MeshTri
 
 from reference import neo_hookean
-from repro.fem.elements import GRADIENT_DEGREES
+from repro.fem.elements import ELEMENTS
 from repro.fem.forms import mass
 from repro.fem.mesh import triangle_areas
 from repro.fem.mesher import generate
@@ -57,7 +57,7 @@ def sliding(points: np.ndarray, triangles: np.ndarray) -> Supported:
     """A body that slides on the wall y = 0 with its middle fixed (2.3.3): points (n, 2) um, triangles (t, 3)."""
     on_wall = np.abs(points[:, 1]) < 1e-9 * RADIUS
     middle = on_wall & (np.abs(points[:, 0]) < 1e-9 * RADIUS)
-    shape = Shape(triangles, len(points), GRADIENT_DEGREES[1])
+    shape = Shape(triangles, len(points), ELEMENTS[1].gradient_degree)
     return Supported(shape, points, np.column_stack([middle, on_wall]))
 
 

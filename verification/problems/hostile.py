@@ -2,8 +2,9 @@
 
 They have tables that jump, odd outlines, permeable bodies, transient substrates, soft bodies under the flow, closed
 pores, starved seeds, dense rows, still water or contact. From :data:`FIRST_LATER` on they have one substrate alone,
-another law of uptake, unlimited decay or a bonded wall. ``scene(seed)`` gives the tables of a scene as in TOML, each
-value a text with its unit. Seeds take the kinds of :data:`KINDS`, and then those of :data:`LATER`, in turn.
+another law of uptake, unlimited decay or a bonded wall. From :data:`FIRST_BODIES` on they have several aggregates, that
+may meet, leave or erode. ``scene(seed)`` gives the tables of a scene as in TOML, each value a text with its
+unit. Seeds take the kinds of :data:`KINDS`, then those of :data:`LATER`, and then those of :data:`BODIES`, in turn.
 """
 
 from collections.abc import Callable
@@ -29,7 +30,7 @@ def kind(seed: int) -> str:
 
 
 def _kinds(seed: int) -> dict[str, Callable[[Random, dict], None]]:
-    return KINDS if seed < FIRST_LATER else LATER
+    return KINDS if seed < FIRST_LATER else LATER if seed < FIRST_BODIES else BODIES
 
 
 def with_other_rows(tables: dict, seed: int) -> dict:
@@ -247,6 +248,48 @@ def bonded(random: Random, tables: dict) -> None:
     tables["growth"]["wall"] = "bonded"
 
 
+def bodies(random: Random, tables: dict) -> None:
+    """Two to six seeds on both walls. Some are bonded."""
+    width, length = _width(tables), float(tables["pore"]["length"].split()[0])
+    seeds: list[dict] = []
+    places: list[tuple[float, float, str]] = []
+    for _ in range(int(random.integers(2, 7))):
+        radius = width * random.uniform(0.08, 0.45)
+        x = (length / 2 - radius - 0.3 * width) * random.uniform(-1, 1)
+        wall = ("lower", "upper")[int(random.integers(2))]
+        if all(np.hypot(x - place, 0 if wall == beside else width) > radius + other + 0.15 * width
+               for place, other, beside in places):
+            places.append((x, radius, wall))
+            seeds.append({"radius": _um(radius), "position": _um(x), "wall": wall})
+    tables["aggregate"] = seeds
+    if random.uniform() < 0.3:
+        tables["growth"]["wall"] = "bonded"
+
+
+def leaving(random: Random, tables: dict) -> None:
+    """Several aggregates on walls that give way, under a flow that jumps. Those that detach leave the pore."""
+    jumps(random, tables)
+    bodies(random, tables)
+    tables["growth"] |= {"bonding_strength": f"{_spread(random, 2e-5, 1e-2):.3g} MPa",
+                         "after_detachment": "continue", "fluid_forces": "included"}
+
+
+def eroding(random: Random, tables: dict) -> None:
+    """Several aggregates that the water erodes, by one of the three laws. Those that are worn down may leave."""
+    bodies(random, tables)
+    growth = tables["growth"]
+    growth["new_biomass"] = "stress_free"
+    if random.uniform() < 0.5:
+        growth["after_detachment"] = "continue"
+    width = _width(tables)
+    speed = width * _spread(random, 1e-3, 0.1)
+    law = ("constant", "thickness squared", "shear")[int(random.integers(3))]
+    growth["erosion"] = {"law": law} | {
+        "constant": {"speed": f"{speed:.4g} um/h"},
+        "thickness squared": {"thickness_coefficient": f"{speed / (0.3 * width) ** 2:.4g} 1/um/h"},
+        "shear": {"shear_coefficient": f"{speed / _spread(random, 1e-3, 0.3):.4g} um/h/Pa"}}[law]
+
+
 KINDS: dict[str, Callable[[Random, dict], None]] = {
     "jumps": jumps, "outline": outlines, "brinkman": brinkman, "gear": gear, "forces": forces, "closed": closed,
     "starved": starved, "dense rows": dense, "still": still, "narrow": narrow}
@@ -254,5 +297,7 @@ KINDS: dict[str, Callable[[Random, dict], None]] = {
 LATER: dict[str, Callable[[Random, dict], None]] = {
     "one substrate": one_substrate, "law": law, "unlimited decay": unlimited, "bonded": bonded}
 FIRST_LATER = 150
+BODIES: dict[str, Callable[[Random, dict], None]] = {"bodies": bodies, "leaving": leaving, "eroding": eroding}
+FIRST_BODIES = 190
 #: Kinds with transient substrates, which take many steps of their own.
 TRANSIENT = ("gear", "closed")

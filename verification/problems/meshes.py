@@ -258,7 +258,8 @@ def along_edges(order: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
     """Gauss's rule on an edge from 0 to 1: points (q,), weights (q,), and functions of its nodes (q, order + 1)."""
     points, weights = np.polynomial.legendre.leggauss(count)
     along = (points + 1) / 2
-    return along, weights / 2, elements.values(order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[order]]
+    functions = elements.values(order, np.column_stack([along, 0 * along]))
+    return along, weights / 2, functions[:, elements.ELEMENTS[order].on_edge]
 
 
 def mean_size(mesh: Mesh, chosen=slice(None)) -> float:

@@ -1,6 +1,7 @@
 """Pores with two to five seeds, drawn by number like the pores of :mod:`verification.problems.family`.
 
     python -m verification.problems.siblings 17 18     # these pores; all of them without numbers
+    python -m verification.problems.siblings pairs 3   # pairs that face each other and weld
 
 A quarter of them are bonded, and another quarter has the forces of the water. Both let an aggregate go that detaches.
 """
@@ -71,6 +72,24 @@ def draw_sibling(number: int) -> Sibling:
     return Sibling(number, width, supply, drive, tuple(seeds), KINDS[draw.integers(4)])
 
 
+#: Pairs that face each other: their number, the sum of both radii and that of the smaller one over the width and the
+#: sum, and the shift along the pore over the smaller radius.
+PAIR_SEED, PAIRS = 47, 12
+FILLED, SMALLER, SHIFT = (0.55, 0.9), (0.3, 0.5), (0.0, 1.0)
+PAIR_KINDS = ((), ("growth.wall=bonded",))
+
+
+def draw_pair(number: int) -> Sibling:
+    """Two seeds on opposite walls that weld. It does not depend on the other ones."""
+    draw = np.random.default_rng([PAIR_SEED, number])
+    width = 25 * 4 ** draw.uniform()
+    supply = 0.28 * (100 / 0.28) ** draw.uniform()
+    radii = width * draw.uniform(*FILLED)
+    smaller = radii * draw.uniform(*SMALLER)
+    seeds = ((smaller, smaller * draw.uniform(*SHIFT), "upper"), (radii - smaller, 0.0, "lower"))
+    return Sibling(number, width, supply, family.DRIVES[draw.integers(3)], seeds, PAIR_KINDS[draw.integers(2)])
+
+
 def run_sibling(sibling: Sibling) -> dict:
     """Run a pore, and judge its end."""
     row = family.run_scene(sibling.scene, sibling.member.duration, LIMIT)
@@ -78,5 +97,7 @@ def run_sibling(sibling: Sibling) -> dict:
 
 
 if __name__ == "__main__":
-    for each in map(int, sys.argv[1:]) if sys.argv[1:] else range(SIBLINGS):
-        print(json.dumps(run_sibling(draw_sibling(each))), flush=True)
+    pairs = sys.argv[1:2] == ["pairs"]
+    draw, count = (draw_pair, PAIRS) if pairs else (draw_sibling, SIBLINGS)
+    for each in [int(text) for text in sys.argv[1 + pairs:]] or range(count):
+        print(json.dumps(run_sibling(draw(each))), flush=True)
