@@ -139,8 +139,8 @@ def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> 
     """Raise MeshError if an outline crosses itself, a wall or an end of the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
-        raise MeshError("the outline of the aggregate crosses itself, and contact is modelled with "
-                        f"the walls alone: {shapely.is_valid_reason(polygon)}")
+        raise MeshError("the outline of the aggregate crosses itself, and contact is modelled only "
+                        f"with walls: {shapely.is_valid_reason(polygon)}")
     for wall in walls:
         gap = wall.gap(outline.points)
         if gap.min() < 0:
@@ -157,10 +157,10 @@ def check_apart(outlines: Sequence[Outline]) -> None:
     """Raise MeshError if two outlines touch elsewhere than in a weld."""
     united, _ = welds.united(outlines, welds.shared_points(outlines)[1])
     if not all(shapely.Polygon(outline.points).is_valid for outline in united):
-        raise MeshError("two welded aggregates touch beside their weld")
+        raise MeshError("two welded aggregates touch outside their weld")
     for outline, other in combinations(united, 2):
         if shapely.Polygon(outline.points).intersects(shapely.Polygon(other.points)):
-            raise MeshError("two aggregates touch, and contact is modelled with the walls alone")
+            raise MeshError("two aggregates touch, and contact is modelled only with walls")
 
 
 def _boundaries(outlines: Sequence[Outline], ends: tuple[float, float],

@@ -61,7 +61,7 @@ def united(outlines: Sequence[Outline],
     weld = np.isin(own[0], own[1])
     starts = np.flatnonzero(weld & ~np.roll(weld, 1))
     if len(starts) != 1:
-        raise MeshError("two aggregates touch in two places; they may join in one")
+        raise MeshError("two aggregates touch at several places; a weld joins them at one place")
     size = int(weld.sum())
     around = (starts[0] + size - 1 + np.arange(len(weld) - size + 2)) % len(weld)
     of_second = np.isin(own[1], own[0])

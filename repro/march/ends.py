@@ -91,7 +91,7 @@ class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
 
     With ``growth.meeting = "weld"``, the default, two aggregates on opposite walls join instead,
-    and the run goes on.
+    and the run continues.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the coordinates (um).
@@ -261,7 +261,7 @@ def steadiness(ends: Ends, start: Pore, pore: Pore) -> Event:
             [_extents(before) for before in start.outlines])
         change = float(np.abs(np.log(ratios)).max(initial=0.0)) / (pore.time - start.time)
     end = Steady(f"the aggregates are steady at t = {pore.time:g} h: their area, thickness and "
-                 f"length change by {change:.2g} of themselves per h at most; "
+                 f"length change by at most {change:.2g} per h, relative to their values; "
                  f"growth.steady_tolerance is {tolerance:g} 1/h")
     return Event(CLOSE if change < tolerance else -1.0, end)
 

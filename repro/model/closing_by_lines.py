@@ -127,9 +127,9 @@ class ByLines(Closing):
         lengths = film * FIRST_LENGTHS
         width = _tip_width(outline, nearest, film * nearest.part)
         if width < 2 * lengths[-1]:
-            raise GrowthError(f"a tip comes into contact that is {width:.2g} um wide at a depth of "
-                              f"{film:.2g} um, the least film; the rule for films (2.3.3) does not "
-                              "describe so thin a tip, and no setting helps")
+            raise GrowthError(f"the tip that touches the wall is only {width:.2g} um wide at a "
+                              f"depth of {film:.2g} um, the least film; the rule for films (2.3.3) "
+                              "does not apply to this thin tip, and no setting helps")
         for length in lengths:
             wall, lines = _first_contact(outline, nearest, length)
             _place_lines(replace(self.grown.boundary, wall=wall), lines, self._advances)
@@ -318,7 +318,7 @@ def _first_contact(outline: Outline, nearest: Wall,
 
 @failing_as(GrowthError)
 def _parts(growing: np.ndarray) -> np.ndarray:
-    """Fractions, up to 1, at which a growth theta / J (t, q) is divided into sub-steps."""
+    """The parts of a growth theta / J (t, q), up to 1."""
     count = growth.GradDiv.parts(growing)
     return np.arange(1, count + 1) / count
 

@@ -383,7 +383,7 @@ def _too_short(system: System, new: Level, difference: np.ndarray, when: str) ->
     name = list(system.problem.substrates.modelled)[species]
     return TransportError(f"the {name} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in steps "
                           f"of {3600 * SHORTEST:g} s; try numerics.transport = "
-                          '"quasi_steady", which solves for the profiles at rest')
+                          '"quasi_steady", which solves for steady profiles')
 
 
 def _corrected(system: System, level: Level, step: float,

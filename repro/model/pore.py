@@ -158,7 +158,7 @@ class Pore:
         if self.focus is not None:
             return self.focus
         if len(self.bodies) > 1:
-            raise ValueError(f"the pore has {len(self.bodies)} aggregates; focused(number) sees "
+            raise ValueError(f"the pore has {len(self.bodies)} aggregates; focused(number) selects "
                              "one of them")
         return 0 if self.bodies else needed(None, "an aggregate")
 

@@ -67,7 +67,7 @@ class Surface:
 @lru_cache(maxsize=2)  # a row uses its own pore and the pore of the last step
 @failing_as(GrowthError)
 def surfaces(pore: Pore) -> tuple[Surface, ...]:
-    """The free surfaces of a pore's aggregates. Raises GrowthError if a stretch is not finite."""
+    """The free surfaces of a pore's aggregates. Raises GrowthError on a floating-point error."""
     return tuple(_surface(pore.mesh, *each)
                  for each in zip(pore.bodies, pore.mesh.regions, pore.outlines))
 

@@ -43,7 +43,7 @@ class Gent(Energy):
         """(...) distance of I from its limit. Raises GrowthError if it is not positive."""
         room = self.invariant_limit - invariant
         if room.min() <= 0:
-            raise GrowthError(f"the strain reaches the limit of Gent's energy: I - 3 comes to "
-                              f"{np.max(invariant) - 3:.3g}, growth.limiting_invariant is "
+            raise GrowthError(f"the strain reaches the limit of Gent's energy: I - 3 is "
+                              f"{np.max(invariant) - 3:.3g}, and growth.limiting_invariant is "
                               f"{self.limit:g}")
         return room
