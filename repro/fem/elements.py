@@ -1,7 +1,7 @@
 """Linear elements on straight triangles, quadratic ones on curved triangles, at quadrature points.
 
 Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``,
-``ElementTriP2``). Elements are isoparametric, as those of its ``MeshTri2``: the functions of order
+``ElementTriP2``). Elements are isoparametric, like its ``MeshTri2``: the functions of order
 1 or 2 also map the unit triangle, x(s, t) = sum_a x_a N_a(s, t), and gradients are
 grad N = N_,st (x_,st)^-1.
 """
@@ -38,7 +38,7 @@ class Element:
     edge_weights: tuple[float, ...]
 
 
-#: By order: linear on straight triangles, quadratic on curved ones.
+#: {order: linear element on straight triangles, or quadratic element on curved triangles}.
 ELEMENTS = {
     1: Element(ElementTriP1(), degree=2, gradient_degree=1, on_edge=(0, 1),
                edge_weights=(1 / 2, 1 / 2)),
@@ -85,8 +85,8 @@ def derivatives(order: int, where: np.ndarray) -> np.ndarray:
 def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree.
 
-    The rules are those of scikit-fem. A degree of one or less needs only the centroid, where
-    scikit-fem takes three points.
+    The rules are scikit-fem's, except for a degree of at most one. It needs only the centroid, but
+    scikit-fem uses three points.
     """
     if degree <= 1:
         return np.full((1, 2), 1 / 3), np.full(1, 0.5)

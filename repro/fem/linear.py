@@ -29,7 +29,7 @@ from repro.timing import timed
 RESIDUAL = 1e-10
 #: The t in RESIDUAL: the smallest normal number. A number that underflows has the absolute error
 #: eps t. A row multiplies the errors of its unknowns by A_ij (Demmel 1984, SIAM J. Sci. Stat.
-#: Comput. 5). For unknowns above 2 t / eps = 2e-292, t is below the last bit.
+#: Comput. 5). It does not change the last bit of unknowns above 2 t / eps, 2e-292.
 UNDERFLOW = np.finfo(float).tiny
 #: The solution is refined if its error is larger than this.
 REFINE = 1e-14

@@ -19,10 +19,10 @@ from repro.fem.walls import FREE, WELD, Walls, numbered, touches_wall, whole_wid
 ACROSS_PORE = 14.0
 ACROSS_AGGREGATE = 10.0
 ACROSS_FILM = 10.0
-#: Ratio of two element sizes beside the contact lines: in a new mesh, and where a step ends. In
-#: ``fast`` the contact lengths err by 1.0, 0.2, 0.15 and 0.02 % with a ratio of 4, by 0.5, 0.02,
-#: 0.06 and 0.25 % with 8, and by 2.4, 0.6, 0.8 and 0.5 % without smaller triangles
-#: (``growth-gold-contact``). With 8 the computing time in contact doubles.
+#: Element size beside the contact lines of a new mesh, over the size at the end of a step. In
+#: ``fast`` contact lengths err by 1.0, 0.2, 0.15 and 0.02 % with 4, by 0.5, 0.02, 0.06 and 0.25 %
+#: with 8, and by 2.4, 0.6, 0.8 and 0.5 % without smaller triangles (``growth-gold-contact``). With
+#: 8 the computing time in contact doubles.
 PARTS_OF_CONTACT = 4.0
 #: The aggregate's thickness sets at most this number of elements along the interface, at refinement
 #: 1. A half-disc has 31. A body more than 60 times longer than thick reaches the limit. With 200 or
@@ -223,7 +223,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     pieces = []
     for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(polygon.points)
-        if edge_wall[keep[0]] == WELD:  # its nodes are those of the other aggregate
+        if edge_wall[keep[0]] == WELD:  # both aggregates share the nodes of a weld
             halves = np.arange(outline.geometry) / outline.geometry
             pieces.append((np.repeat(keep[:-1], len(halves)), np.tile(halves, len(keep) - 1)))
         elif edge_wall[keep[0]] != FREE:

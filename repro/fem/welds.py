@@ -174,7 +174,7 @@ def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
 
 
 def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
-    """Number of consecutive pairs of opposite corners, counted from the line, which is the first.
+    """Number of consecutive pairs of opposite corners; the line is the first pair.
 
     one, two: (c,) and (d,) um, arc lengths of the corners of both surfaces from the line.
     """
