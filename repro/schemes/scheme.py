@@ -80,7 +80,8 @@ class Scheme:
 
     @property
     def follows_layers(self) -> bool:
-        """Are elements refined at boundary layers and fronts? Linear ones, the paper's, are not."""
+        """Are elements refined at boundary layers and fronts? The paper's linear elements are not.
+        """
         return self.order > 1
 
     @property
