@@ -218,7 +218,7 @@ class ByLines(Closing):
                                                               np.ndarray | None]:
         """A grown pore with a contact, its division, and the forces on its nodes.
 
-        If the divided arcs are those of the last call, its connections are reused.
+        If the same arcs are divided as in the last call, its connections are reused.
         """
         if not len(contact.arcs):
             return grown.with_body(wall=contact.wall), None, self.forces

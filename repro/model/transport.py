@@ -238,7 +238,7 @@ class Carrier(ABC):
 
 
 class DivergenceFree(Carrier):
-    """w, whose divergence vanishes against every function of the space."""
+    """w; its divergence vanishes against every function of the space."""
 
     @staticmethod
     def linear(flow: Flow, correction: np.ndarray, mesh: Mesh) -> np.ndarray:
