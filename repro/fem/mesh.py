@@ -445,7 +445,7 @@ class Mesh:
         return nodal
 
     def from_region(self, region: Region, values: np.ndarray) -> np.ndarray:
-        """(N, k) values at all nodes: ``values`` (n, k) at one aggregate's nodes, zero elsewhere."""
+        """(N, k) at all nodes: ``values`` (n, k) at one aggregate's nodes, zero elsewhere."""
         nodal = np.zeros((len(self.points), values.shape[1]))
         nodal[region.nodes] = values
         return nodal
