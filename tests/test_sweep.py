@@ -391,7 +391,7 @@ ENDS = ["the aggregate reaches the pore's downstream end at t = 0 h",
         "aggregates left and 2 meet at t = 3.5 h: near x = 3, y = 20 um the film between them is 2 um",
         "aggregate left is eroded at t = 3 h: its thickness or contact is 2 um, below growth.minimum_film",
         "erosion takes a contact surface at y = 20 um in the step from t = 3 h",
-        "the aggregates are steady at t = 30 h: their area, thickness and length change by 0.0009 of themselves per h"]
+        "the aggregates are steady at t = 30 h: their area, thickness and length change by at most 0.0009 per h"]
 NAMED = [end.replace("the aggregate", "aggregate left") for end in ENDS if re.match("the aggregate( |'s)", end)]
 STATUSES = dict.fromkeys([COMPLETED, *ENDS, *NAMED], True) | dict.fromkeys(
     [f"{FAILED}x", INTERRUPTED, RUNNING, f"{ENDS[0]}!", ENDS[2].partition(":")[0], ENDS[4].partition(":")[0]], False)

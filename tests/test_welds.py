@@ -95,7 +95,7 @@ def test_aggregates_that_share_two_chains_of_nodes_are_refused():
     shared = other.points.copy()
     shared[[3, 9]] = outline.points[[3, 9]]
     outlines = [outline, replace(other, points=shared)]
-    with pytest.raises(MeshError, match="two aggregates touch in two places; they may join in one"):
+    with pytest.raises(MeshError, match="two aggregates touch at several places; a weld joins them at one place"):
         welds.united(outlines, welds.shared_points(outlines)[1])
 
 

@@ -1,8 +1,8 @@
 """Assemble sparse systems from element matrices.
 
 The sparsity, the elimination order and the position of every element entry in the sparse matrix
-depend only on the connections of a mesh, and are computed once. While the mesh only moves, an
-assembly is one summation.
+depend only on the connections of a mesh. They are computed once. As long as the connections stay
+the same, an assembly is one summation.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
 
 
 class ElementSystem:
-    """K x = b with some unknowns prescribed, K summed from element matrices.
+    """System K x = b with prescribed unknowns; K is the sum of element matrices.
 
-    unknowns: (T, k) numbers of each element's unknowns, or an array for each kind of
+    unknowns: (T, k) numbers of each element's unknowns, or one array for each kind of
     element; rank: (n,) sorting key of the unknowns in elimination order; constrained: (n,) True
     where the unknown is prescribed. Methods take element matrices (T, k, k) for each kind.
     """
@@ -71,11 +71,14 @@ class ElementSystem:
         return self.filled(np.bincount(self._slot, _flat(_several(elements)), len(self._rows)))
 
     def entries(self, number: int, elements: np.ndarray) -> np.ndarray:
-        """Column-wise entries of the matrix between all unknowns, summed over kind ``number``."""
+        """(d,) entries of K between all unknowns, column by column, from elements of one kind.
+
+        number: index of the kind; elements: (T, k, k) its element matrices.
+        """
         return np.bincount(self._slots[number], elements.ravel(), len(self._rows))
 
     def filled(self, entries: np.ndarray) -> sp.csc_matrix:
-        """K between the free unknowns, from the result of :meth:`entries`."""
+        """K between the free unknowns, from entries (d,) as :meth:`entries` returns them."""
         matrix = copy(self._pattern)
         matrix.data = entries[self._entry_indices]
         return matrix
@@ -87,7 +90,7 @@ class ElementSystem:
         return self.assemble(tuple(parts))
 
     def assemble(self, loads: Parts) -> np.ndarray:
-        """(n,) sums of element loads (T, k) for each kind."""
+        """(n,) sums of the element loads (T, k) of all kinds."""
         return np.bincount(_flat(self.kinds), _flat(_several(loads)), len(self.constrained))
 
     def factored(self, elements: Parts) -> Factored:
@@ -102,7 +105,7 @@ class ElementSystem:
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """K of a system, from its element matrices, with its factors."""
+    """The matrix K of a system: its element matrices and its factors."""
 
     system: ElementSystem
     elements: Parts
@@ -121,10 +124,11 @@ class Factored:
 
 @dataclass(frozen=True, eq=False)
 class Supported(Factored):
-    """K of a system in which multiples of loads balance the rows of some prescribed unknowns.
+    """Factorised system with m more unknowns: multipliers s of the loads L.
 
-    loads: (n, m); rows: (m,) of the prescribed unknowns. With B = K^-1 L, one more solution for
-    each load, the solution is x - B s. The multiples s balance the rows.
+    loads: (n, m) L; rows: (m,) numbers of prescribed unknowns whose rows must balance too. With
+    B = K^-1 L, which takes one solution for each load, the solution is x - B s. The multipliers s
+    follow from the balance of ``rows``.
     """
 
     loads: np.ndarray
@@ -137,13 +141,13 @@ class Supported(Factored):
 
     @cached_property
     def _per_multiple(self) -> np.ndarray:
-        """(m, m) forces in the rows for a multiple of one."""
+        """(m, m) forces in ``rows`` (first axis) for each load with a multiplier of one."""
         forces = [load - self.system.product(self.elements, response)
                   for load, response in zip(self.loads.T, self._responses.T)]
         return np.column_stack(forces)[self.rows]
 
     def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
-        """x (n,) of K x + L s = b (n,), in the rows ``rows`` too; the prescribed unknowns as in
+        """x (n,) of K x + L s = b (n,), also in ``rows``. Prescribed unknowns are as in
         :meth:`Factored.solve`."""
         x = super().solve(right, value)
         unbalanced = right - self.system.product(self.elements, x)
@@ -153,8 +157,10 @@ class Supported(Factored):
 
 def _distinct(rows: np.ndarray, columns: np.ndarray,
               count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows and columns (d,) of the distinct entries among m, sorted by column and then by row; and
-    (m,) the number of the distinct entry of each."""
+    """Rows and columns (d,) of the distinct entries among m entries, sorted by column, then row.
+
+    Also returns the number (m,) of the distinct entry to which each entry belongs.
+    """
     order = _counting_sort(rows, count)
     order = order[_counting_sort(columns[order], count)]
     rows = rows[order]
@@ -167,9 +173,9 @@ def _distinct(rows: np.ndarray, columns: np.ndarray,
 
 
 def _counting_sort(keys: np.ndarray, count: int) -> np.ndarray:
-    """(m,) stable order of keys (m,) from 0 to count - 1, in linear time.
+    """(m,) indices that sort keys (m,) from 0 to count - 1, stably and in linear time.
 
-    SciPy transposes a sparse row by counting its columns. np.argsort takes twice as long.
+    The sort is SciPy's transposition of a sparse row. np.argsort takes twice as long.
     """
     ends = np.array([0, len(keys)], np.int32)
     entries = np.arange(len(keys), dtype=np.int32)
@@ -208,13 +214,13 @@ def saddle_blocks(upper: np.ndarray, divergence: np.ndarray,
 def saddle_system(velocity: np.ndarray, pressure: np.ndarray, constrained: np.ndarray,
                   order: np.ndarray | None = None, method: Method = DEFAULT,
                   doubled: np.ndarray | None = None) -> ElementSystem:
-    """Build the system of a velocity and of a pressure on some of its nodes.
+    """Build the system of a velocity at all nodes and a pressure at some of them.
 
-    velocity: (T, a) nodes of each component; pressure: (T, b) numbers of the pressures: nodes, the
-    first ones of the velocity, and then the second pressures of the nodes ``doubled`` (d,), if
-    there are any; constrained: (n, 2) prescribed components; order: (n,) nodes in elimination
-    order, if known. Unknowns are numbered x, then y, then pressure; each pressure is eliminated
-    after the components at its node.
+    velocity: (T, a) nodes of each component; pressure: (T, b) numbers of the pressures. The first
+    pressures belong to the first nodes of the velocity. The last ones are second pressures at the
+    nodes ``doubled`` (d,), if any; constrained: (n, 2) prescribed components; order: (n,) nodes in
+    elimination order, if known. Unknowns are numbered x, then y, then pressure. Each pressure is
+    eliminated after the components at its node.
     """
     count = len(constrained)
     pressures = pressure.max() + 1

@@ -1,8 +1,9 @@
 """Division of arcs of the aggregate's boundary at any point.
 
-A contact line may lie within an arc. It divides the arc and the two triangles beside it, along the
-straight line on the unit triangle from the contact line to the opposite corner. Each part keeps the
-map of its triangle, so a division changes no shape and no field.
+A contact line may lie within an arc. Then it divides the arc and the two triangles beside the arc.
+Each triangle is cut along the straight line, on the unit triangle, from the contact line to the
+opposite corner. Both pieces keep the map of the triangle, so a division changes no shape and no
+field.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 class DividedTriangle:
     """A triangle beside a divided arc.
 
-    cell: number of the triangle; edge: number of its edge on the arc; arc: position of the arc in
-    :attr:`Division.arcs`; forward: does the edge run as the loop does; t: where the edge is
-    divided, from its first corner.
+    cell: number of the triangle; edge: number of its edge on the arc; arc: index of the arc in
+    :attr:`Division.arcs`; forward: does the edge run in the direction of the loop?; t: where the
+    edge is divided, from zero at its first corner to one.
     """
 
     cell: int
@@ -63,8 +64,8 @@ class DividedTriangle:
         return replace(self, t=t if self.forward else 1 - t)
 
     def nodes(self, values: np.ndarray) -> np.ndarray:
-        """(2, 6, ...) values at the nodes of both parts, from those (6, ...) at the triangle's
-        nodes."""
+        """(2, 6, ...) values at the nodes of both parts, from values (6, ...) at the nodes of the
+        triangle."""
         corners = np.stack(self.parts)
         where = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) / 2], axis=1)
         shapes = quadratic(where.reshape(-1, 2))
@@ -84,7 +85,7 @@ class Division:
     t : (d,) float
         Where each arc is divided, in (0, 1) along the loop.
     number : int
-        Place, in the list of aggregates, of the one whose loop is divided.
+        Index of the aggregate whose loop is divided.
     """
 
     parent: Mesh
@@ -104,7 +105,7 @@ class Division:
 
     @property
     def region(self) -> np.ndarray:
-        """(T,) True in the parent's triangles of the aggregate."""
+        """(T,) True for the parent's triangles in the aggregate."""
         return self.parent.topology.region == self.number + 1
 
     @property
@@ -139,9 +140,9 @@ class Division:
     def topology(self) -> Topology:
         """Connections of the divided mesh.
 
-        New corners follow the old corners. New middles follow the old middles: first those of the
-        second halves of the arcs, then one inside each divided triangle. The first part of a
-        divided triangle takes its place, the second one follows all other triangles.
+        New corners follow the old corners. New middles follow the old middles: first the middles of
+        the second halves of the arcs, then one inside each divided triangle. The first part of a
+        divided triangle keeps its number. The second parts follow all other triangles.
         """
         topology = self.parent.topology
         count = len(self.arcs)
@@ -165,18 +166,18 @@ class Division:
                        region=np.concatenate([topology.region, region]), loops=tuple(loops))
 
     def _renumbered(self, nodes: np.ndarray) -> np.ndarray:
-        """Numbers of the parent's nodes in the divided mesh."""
+        """Numbers in the divided mesh of the parent's ``nodes``."""
         return np.where(nodes >= self.parent.corners, nodes + len(self.arcs), nodes)
 
     def along_loop(self, values: np.ndarray, corners: np.ndarray,
                    halves: np.ndarray) -> np.ndarray:
-        """(M + 2 d,) values at the loop's nodes (M,), with those of the new corners (d,) and of the
-        middles of the second halves (d,)."""
+        """(M + 2 d,) values along the divided loop, from values (M,) at the loop's nodes, (d,) at
+        the new corners and (d,) at the middles of the second halves."""
         added = np.column_stack([corners, halves]).ravel()
         return np.insert(values, np.repeat(2 * self.arcs + 2, 2), added)
 
     def nodal(self, values: np.ndarray) -> np.ndarray:
-        """Values at all nodes, from those (N, ...) at the parent's nodes."""
+        """Values at all nodes, from values (N, ...) at the parent's nodes."""
         shape = (len(self.arcs), *values.shape[1:])
         places, first_halves, second_halves = (np.empty(shape) for _ in range(3))
         inside = []
@@ -205,7 +206,7 @@ class Division:
         return np.concatenate([values, (1 - self.t) * values[start] + self.t * values[end]])
 
     def restricted(self, values: np.ndarray) -> np.ndarray:
-        """(N, ...) values at the parent's nodes, from those at all nodes of the divided mesh."""
+        """(N, ...) values at the parent's nodes, from values at all nodes of the divided mesh."""
         corners = self.parent.corners
         first_middle = corners + len(self.arcs)
         last_middle = first_middle + len(self.parent.points) - corners
@@ -218,9 +219,9 @@ class Division:
         return restricted
 
     def divided_loads(self, loads: np.ndarray) -> np.ndarray:
-        """Nodal loads on the divided mesh, from those on the parent's nodes (N, 2).
+        """Nodal loads on the divided mesh, from loads (N, 2) on the parent's nodes.
 
-        The load at the middle of an arc counts as that of a uniform traction on the arc.
+        The load at the middle of a divided arc is taken as the load of a uniform traction.
         """
         corners = self.parent.corners
         loop = self.loop
@@ -256,7 +257,8 @@ class Division:
         return gathered
 
     def halves(self, arc: int) -> tuple[np.ndarray, DividedTriangle]:
-        """(2,) rows of both parts of the triangle at the divided arc ``arc``, and the triangle."""
+        """The aggregate's triangle beside the divided arc ``arc``, and the indices (2,) of both of
+        its parts among the aggregate's triangles."""
         region = self.region
         inside = [triangle for triangle in self.triangles if region[triangle.cell]]
         number = next(k for k, triangle in enumerate(inside) if triangle.arc == arc)
@@ -266,9 +268,9 @@ class Division:
     def amounts(self, amounts: np.ndarray, table: Table) -> np.ndarray:
         """(r + d, q) amounts at the quadrature points of the divided aggregate.
 
-        Within a divided triangle the amount per area of the unit triangle is the linear function
-        that fits the parent's values best, limited to their range; both parts together keep its
-        sum.
+        A linear function is fitted to the amounts per area of the unit triangle in a divided
+        triangle, and is limited to their range. Both parts get its values, scaled so that the
+        triangle's total stays the same.
 
         Parameters
         ----------

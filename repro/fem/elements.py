@@ -1,7 +1,7 @@
 """Linear elements on straight triangles, quadratic ones on curved triangles, at quadrature points.
 
 Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``,
-``ElementTriP2``). Elements are isoparametric, as those of its ``MeshTri2``: the functions of order
+``ElementTriP2``). Elements are isoparametric, like its ``MeshTri2``: the functions of order
 1 or 2 also map the unit triangle, x(s, t) = sum_a x_a N_a(s, t), and gradients are
 grad N = N_,st (x_,st)^-1.
 """
@@ -24,10 +24,11 @@ NEXT = [1, 2, 0]
 class Element:
     """The functions of an order, and the quadrature that they need.
 
-    degree: of the quadrature on triangles and on edges, for products of two functions and a
-    coefficient that is nearly linear; gradient_degree: of that for gradients, lower for linear
-    functions, whose gradients are constant; on_edge: functions of the edge 01 among those of the
-    triangle; edge_weights: of its nodes in Newton's and Cotes' rule.
+    degree: of the quadrature on triangles and edges, for products of two functions and a nearly
+    linear coefficient; gradient_degree: of the quadrature for products of gradients, lower for
+    linear functions because their gradients are constant; on_edge: indices of the triangle's
+    functions that belong to edge 01; edge_weights: weights of this edge's nodes in the
+    Newton-Cotes rule.
     """
 
     functions: ElementH1
@@ -37,7 +38,7 @@ class Element:
     edge_weights: tuple[float, ...]
 
 
-#: By order: linear on straight triangles, quadratic on curved ones.
+#: {order: linear element on straight triangles, or quadratic element on curved triangles}.
 ELEMENTS = {
     1: Element(ElementTriP1(), degree=2, gradient_degree=1, on_edge=(0, 1),
                edge_weights=(1 / 2, 1 / 2)),
@@ -52,7 +53,7 @@ def order_of(cells: np.ndarray) -> int:
 
 
 def nodes(order: int) -> np.ndarray:
-    """(k, 2) places of the nodes of an element on the unit triangle."""
+    """(k, 2) coordinates of an element's nodes on the unit triangle."""
     return np.asarray(ELEMENTS[order].functions.doflocs)
 
 
@@ -84,8 +85,8 @@ def derivatives(order: int, where: np.ndarray) -> np.ndarray:
 def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree.
 
-    The rules are those of scikit-fem. A degree of one or less needs only the centroid, where
-    scikit-fem takes three points.
+    The rules are scikit-fem's, except for a degree of at most one. It needs only the centroid, but
+    scikit-fem uses three points.
     """
     if degree <= 1:
         return np.full((1, 2), 1 / 3), np.full(1, 0.5)
@@ -115,7 +116,7 @@ def table(order: int, degree: int) -> Table:
 
 @cache
 def vertex_table(order: int) -> Table:
-    """Like :func:`table`, but at the corners, which lumps the integrals."""
+    """Like :func:`table`, but at the corners with equal weights. This lumps the integrals."""
     return _tabulated(order, nodes(1), np.full(3, 1 / 6))
 
 
@@ -127,14 +128,14 @@ def _tabulated(order: int, where: np.ndarray, weights: np.ndarray) -> Table:
 def linear_fit(of: Table) -> np.ndarray:
     """(3, q) matrix of the least-squares fit of a linear function.
 
-    It takes values at the points of a table to values at the corners.
+    The matrix maps values at the points of a table to values at the corners.
     """
     return np.linalg.pinv(of.linear)
 
 
 @cache
 def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
-    """(p, e) shape functions of an edge's nodes at its quadrature points, and the weights (p,)."""
+    """(p, e) shape functions of an edge's e nodes at its p quadrature points, and (p,) weights."""
     element = ELEMENTS[order]
     (s,), weights = get_quadrature_line(element.degree)
     along = values(order, np.column_stack([s, 0 * s]))
@@ -185,7 +186,7 @@ def jacobian(corners: np.ndarray, derivatives: np.ndarray) -> np.ndarray:
 def mapped(corners: np.ndarray, tabulated: Table) -> tuple[np.ndarray, np.ndarray]:
     """Weights (T, q) um2 of the points, and gradients (T, q, 2, k) 1/um of the functions.
 
-    corners: (T, k, 2) um, nodes of triangles, none of which is turned over.
+    corners: (T, k, 2) um, nodes of triangles. No triangle may be turned over.
     """
     J = jacobian(corners, tabulated.derivatives)
     det = determinant(J)
@@ -198,5 +199,5 @@ def mapped(corners: np.ndarray, tabulated: Table) -> tuple[np.ndarray, np.ndarra
 
 
 def weights(corners: np.ndarray, tabulated: Table) -> np.ndarray:
-    """(T, q) um2, the weights dx without the gradients."""
+    """(T, q) um2, the weights dx of :func:`mapped`, without the gradients."""
     return determinant(jacobian(corners, tabulated.derivatives)) * tabulated.weights

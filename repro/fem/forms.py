@@ -1,8 +1,8 @@
 """Weak forms as sums over tabulated points.
 
 A :class:`Basis` has the functions of a space at the quadrature points. A stage computes the
-coefficient, flux or stress of a term at these points, times dx. A form multiplies it by the test
-functions v and the trial functions u, and sums over the points of each triangle:
+coefficient, flux or stress of a term at these points, times dx. A form multiplies this value by the
+test functions v and the trial functions u, and sums over the points of each triangle:
 
     (f, v)              load(f dx)              (q, grad v)     flux(q dx)
     (c u, v)            mass(c dx)              (S, grad v)     flux(S dx)
@@ -25,8 +25,9 @@ from repro.fem.elements import Table
 class Basis:
     """Functions on triangles, at the points where forms are integrated.
 
-    cells: (T, k) nodes, of ``count`` in all; values: (q, k) of the functions; dx: (T, q) um2,
-    weights of the points; gradients: (T, q, 2, k) 1/um, empty where no form needs them.
+    cells: (T, k) nodes of each triangle; count: number of nodes of the mesh; values: (q, k) of the
+    functions; dx: (T, q) um2, weights of the points; gradients: (T, q, 2, k) 1/um, empty if no form
+    needs them.
     """
 
     cells: np.ndarray
@@ -37,7 +38,8 @@ class Basis:
 
     @cached_property
     def weighted(self) -> Basis:
-        """The same functions with gradients times dx, for fluxes without dx."""
+        """The same functions with gradients times dx, so that :meth:`flux` takes fluxes without dx.
+        """
         rows = _scaled(self.dx, self.rows)
         return replace(self, gradients=rows.reshape(self.gradients.shape))
 
@@ -90,8 +92,8 @@ class Basis:
         return self.assemble(self.load(f))
 
     def assemble(self, loads: np.ndarray) -> np.ndarray:
-        """(m count,) sums at the nodes of loads (T, m, k) of m components, one after the other, or
-        of (T, k)."""
+        """(m count,) sums at the nodes of loads (T, m, k), component after component, or of (T, k).
+        """
         parts = loads[:, None] if loads.ndim == 2 else loads
         first = self.count * np.arange(parts.shape[1])
         nodes = self.cells[:, None] + first[:, None]
@@ -99,9 +101,9 @@ class Basis:
 
 
 def basis(cells: np.ndarray, count: int, corners: np.ndarray, of: Table) -> Basis:
-    """Map the functions of a table to triangles, none of them turned over.
+    """Map the functions of a table to triangles. No triangle may be turned over.
 
-    cells, count: nodes of the functions; corners: (T, g, 2) um, nodes of the triangles.
+    cells, count: as in :class:`Basis`; corners: (T, g, 2) um, nodes of the triangles' maps.
     """
     return Basis(cells, count, of.values, *elements.mapped(corners, of))
 

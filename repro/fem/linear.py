@@ -28,13 +28,13 @@ from repro.timing import timed
 #: Largest accepted componentwise backward error, max |A x - b|_i / (|A| (|x| + t) + |b| + t)_i.
 RESIDUAL = 1e-10
 #: The t in RESIDUAL: the smallest normal number. A number that underflows has the absolute error
-#: eps t, and a row multiplies the errors of its unknowns by A_ij (Demmel 1984, SIAM J. Sci. Stat.
-#: Comput. 5). The last bit of unknowns above 2 t / eps, 2e-292, does not change.
+#: eps t. A row multiplies the errors of its unknowns by A_ij (Demmel 1984, SIAM J. Sci. Stat.
+#: Comput. 5). It does not change the last bit of unknowns above 2 t / eps, 2e-292.
 UNDERFLOW = np.finfo(float).tiny
 #: The solution is refined if its error is larger than this.
 REFINE = 1e-14
 
-#: Name of factorisation and solution in the times by stage.
+#: Name of this stage in the table of computing times.
 STAGE = "factorise and solve"
 
 
@@ -69,11 +69,13 @@ def pairs(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def node_order(count: int, elements: np.ndarray) -> np.ndarray:
-    """(count,) nodes by SuperLU's minimum degree, from the elements (T, k) that couple them; each
-    node is in at least one element."""
+    """(count,) nodes in the elimination order of SuperLU's minimum degree.
+
+    elements: (T, k) nodes that each element couples; each node is in at least one element.
+    """
     k = elements.shape[1]
     rows, columns = (part.ravel() for part in pairs(elements))
-    # SuperLU orders a matrix by factorising it; this one has a dominant diagonal.
+    # SuperLU orders only while it factorises; the diagonal of this matrix is dominant.
     dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))
     graph = sp.csc_matrix((dominant, (rows, columns)), shape=(count, count))
     factor = splu(graph, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,

@@ -1,9 +1,9 @@
 """Triangles of the meshed part of the pore (3.1): one mesh for fluid and biomass.
 
 A curved triangle has six nodes: corners, then the middles of the edges 01, 12 and 20
-(isoparametric). A :class:`Topology` has the properties that depend only on the connections; a mesh
-that moves keeps it. A :class:`Mesh` computes the properties that depend on the coordinates of its
-nodes once, because its nodes never change.
+(isoparametric). A :class:`Topology` has the properties that depend only on the connections. A moved
+mesh keeps the topology. A :class:`Mesh` is immutable, so it computes once each property that
+depends on the coordinates of its nodes.
 """
 
 from __future__ import annotations
@@ -22,15 +22,18 @@ from repro.fem.brief import brief
 from repro.fem.linear import DEFAULT, Method, node_order
 from repro.fem.walls import Wall, Walls, on_any, whole_width, width_between
 
-#: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
+#: A new mesh is needed if more than POOR_ALLOWED triangles have a quality below POOR (3.5).
 POOR = 0.6
 POOR_ALLOWED = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Dofs:
-    """Nodes of a mesh. cells: (T, 3 or 6), corners first; count: of all nodes; inlet, outlet: (E, 2
-    or 3) nodes of their edges, from the lower wall up; walls: nodes of both walls."""
+    """Nodes of a mesh.
+
+    cells: (T, 3 or 6) nodes of each triangle, corners first; count: number of all nodes; inlet,
+    outlet: (E, 2 or 3) nodes of each edge, from the lower wall up; walls: nodes on both walls.
+    """
 
     cells: np.ndarray
     count: int
@@ -45,15 +48,15 @@ class Dofs:
 
     @cached_property
     def places(self) -> np.ndarray:
-        """(count,) place of each node in elimination order."""
+        """(count,) position of each node in the elimination order."""
         places = np.empty(self.count)
         places[self.elimination] = np.arange(self.count)
         return places
 
     @cached_property
     def beside_inlet(self) -> tuple[np.ndarray, np.ndarray]:
-        """(E,) triangle of each edge of the inlet, and (E, 2 or 3) places of the edge's nodes
-        among those of the triangle."""
+        """(E,) triangle beside each edge of the inlet, and (E, 2 or 3) local indices of the edge's
+        nodes in this triangle."""
         return beside(self.cells, self.inlet)
 
     @cached_property
@@ -63,7 +66,8 @@ class Dofs:
 
 
 def beside(cells: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The triangle of cells (T, 3 or 6) beside each edge (E, e), and places of its nodes there."""
+    """(E,) triangle of ``cells`` (T, 3 or 6) beside each edge (E, e), and (E, e) local indices of
+    the edge's nodes in this triangle."""
     first = np.flatnonzero(np.isin(cells[:, :3], edges[:, [0, -1]]).sum(axis=1) >= 2)
     near = cells[first, :3]
     has_start = (near == edges[:, None, None, 0]).any(axis=2)
@@ -76,9 +80,9 @@ def beside(cells: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray
 class Region:
     """One aggregate among the triangles of a mesh.
 
-    triangles: (t,) their numbers; cells: (t, 3 or 6) their nodes; corners: number of the mesh's
-    corners; loop: (M,) nodes of the aggregate's boundary, counterclockwise, corner and middle in
-    turn where there are middles.
+    triangles: (t,) numbers of its triangles; cells: (t, 3 or 6) nodes of these triangles; corners:
+    number of corners in the mesh; loop: (M,) nodes of the aggregate's boundary, counterclockwise.
+    On curved triangles corners and middles alternate.
     """
 
     triangles: np.ndarray
@@ -88,28 +92,28 @@ class Region:
 
     @cached_property
     def nodes(self) -> np.ndarray:
-        """(n,) its nodes, its boundary included, ascending: corners first."""
+        """(n,) nodes of the aggregate and its boundary, ascending: corners first."""
         return np.unique(self.cells)
 
     @cached_property
     def own_cells(self) -> np.ndarray:
-        """(t, 3 or 6) its triangles in the numbering of ``nodes``."""
+        """(t, 3 or 6) ``cells`` as indices into ``nodes``."""
         return np.searchsorted(self.nodes, self.cells)
 
     @cached_property
     def own_loop(self) -> np.ndarray:
-        """(M,) ``loop`` in the numbering of ``nodes``."""
+        """(M,) ``loop`` as indices into ``nodes``."""
         return np.searchsorted(self.nodes, self.loop)
 
     @cached_property
     def corner_nodes(self) -> np.ndarray:
-        """Its corners."""
+        """Corners among ``nodes``."""
         return self.nodes[self.nodes < self.corners]
 
     @cached_property
     def beside_loop(self) -> tuple[np.ndarray, np.ndarray]:
-        """(edges,) its triangle beside each edge of ``loop``, and the number of this edge among the
-        triangle's edges 01, 12 and 20."""
+        """(edges,) triangle of the aggregate beside each edge of ``loop``, and (edges,) number of
+        this edge in the triangle: 0 for 01, 1 for 12, 2 for 20."""
         line = self.loop[:: elements.order_of(self.cells)]
         owner, places = beside(self.cells, np.column_stack([line, np.roll(line, -1)]))
         return owner, places[:, 0]
@@ -140,9 +144,9 @@ class Connections:
 class Topology(Connections):
     """Connections of a mesh.
 
-    region: (T,) number of each triangle's aggregate, from one, zero in the fluid; loops:
-    (M,) nodes of the boundary of each aggregate, as in :class:`Region`; inlet, outlet: corners from
-    the lower wall up; walls: corners of both walls; method: of the linear systems.
+    region: (T,) number of each triangle's aggregate from 1 on, 0 in the fluid; loops: (M,) nodes of
+    the boundary of each aggregate, as in :class:`Region`; inlet, outlet: corners from the lower
+    wall up; walls: corners on both walls; method: solver of the linear systems.
     """
 
     region: np.ndarray
@@ -182,7 +186,7 @@ class Topology(Connections):
 
     @cached_property
     def body_cells(self) -> np.ndarray:
-        """(t, 3 or 6) biomass triangles in the numbering of ``body``."""
+        """(t, 3 or 6) nodes of the biomass triangles as indices into ``body``."""
         return np.searchsorted(self.body, self.cells[self.biomass])
 
     @cached_property
@@ -197,8 +201,8 @@ class Topology(Connections):
 
     @cached_property
     def bent(self) -> np.ndarray:
-        """Triangles with a node of an aggregate; the others of a mesh that has moved with it are
-        straight."""
+        """Triangles with a node of an aggregate. In a moved mesh all other triangles are straight.
+        """
         return np.flatnonzero(np.isin(self.cells, self.body).any(axis=1))
 
     @cached_property
@@ -215,7 +219,7 @@ class Topology(Connections):
 
     @property
     def edges(self) -> np.ndarray:
-        """(E, 2) corners at the ends of every edge; with curved triangles edge i has its middle at
+        """(E, 2) corners at the ends of every edge. On curved triangles the middle of edge i is
         node ``corners`` + i."""
         return self._edges[0]
 
@@ -232,7 +236,7 @@ class Topology(Connections):
         return keys[ascending], ascending
 
     def edge_numbers(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(K,) numbers of the edges between two corners (K,) each."""
+        """(K,) numbers of the edges between the corners ``first`` (K,) and ``second`` (K,)."""
         keys, ascending = self._edge_keys
         edge_keys = np.minimum(first, second) * self.corners + np.maximum(first, second)
         return ascending[np.searchsorted(keys, edge_keys)]
@@ -243,7 +247,7 @@ class Topology(Connections):
         return _corners(self) if self.geometry == 1 else _corners_and_middles(self)
 
     def system(self, key: Hashable, make: Callable[[], ElementSystem]) -> ElementSystem:
-        """A sparse system on these connections, built by ``make`` on first use."""
+        """The sparse system of a key on these connections; ``make`` builds it on first use."""
         if key not in self._systems:
             self._systems[key] = make()
         return self._systems[key]
@@ -271,7 +275,7 @@ def _with_middles(topology: Topology, line: np.ndarray) -> np.ndarray:
 
 
 def _middles_on_walls(topology: Topology) -> np.ndarray:
-    """Middles on both walls: those of edges with one triangle, between corners of one wall."""
+    """Middles on both walls: middles of edges that have one triangle and both corners on a wall."""
     on = np.zeros(topology.corners, bool)
     on[topology.walls] = True
     single = np.bincount(topology.cell_edges.ravel(), minlength=len(topology.edges)) == 1
@@ -291,9 +295,9 @@ def _across(topology: Topology) -> np.ndarray:
 @brief
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of fluid and biomass between two walls, and over ``ends`` (um) along them.
+    """Triangles of fluid and biomass between two walls and two ends.
 
-    points: (N, 2) um, places of the nodes, corners first.
+    points: (N, 2) um, coordinates of the nodes, corners first; ends: x (um) of inlet and outlet.
     """
 
     points: np.ndarray
@@ -307,7 +311,7 @@ class Mesh:
            method: Method = DEFAULT) -> Mesh:
         """Build the mesh of triangles with nodes (T, 3 or 6), corners numbered first.
 
-        region, loops: as in :class:`Topology`; region may be True in the one aggregate.
+        region, loops: as in :class:`Topology`; with one aggregate ``region`` may be boolean.
         """
         count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
         x, y = points[:count].T
@@ -328,7 +332,7 @@ class Mesh:
 
     @property
     def whole_width(self) -> float:
-        """W, or the width with the mirror image beyond a plane of symmetry (um)."""
+        """Width (um) of the pore: W, or 2 W if one wall is a plane of symmetry."""
         return whole_width(self.walls)
 
     @property
@@ -432,31 +436,33 @@ class Mesh:
         return np.concatenate([field, 0.5 * (field[a] + field[b])])
 
     def from_body(self, values: np.ndarray, outside: np.ndarray | float = 0.0) -> np.ndarray:
-        """(N, k) values at all nodes, from those (n, k) at the aggregate's; ``outside``, (N, k) or
-        a number, in the fluid."""
+        """(N, k) values at all nodes, from values (n, k) at the aggregates' nodes.
+
+        outside: values in the fluid, (N, k) or a number.
+        """
         nodal = np.full((len(self.points), values.shape[1]), outside)
         nodal[self.body] = values
         return nodal
 
     def from_region(self, region: Region, values: np.ndarray) -> np.ndarray:
-        """(N, k) values at all nodes, from those (n, k) at one aggregate's; zero elsewhere."""
+        """(N, k) at all nodes: ``values`` (n, k) at one aggregate's nodes, zero elsewhere."""
         nodal = np.zeros((len(self.points), values.shape[1]))
         nodal[region.nodes] = values
         return nodal
 
     def of_region(self, region: Region, values: np.ndarray) -> np.ndarray:
-        """(n, k) values at the nodes of one aggregate, from those at the nodes of all."""
+        """(n, k) values at the nodes of one aggregate, from values at the nodes of all of them."""
         return values[np.searchsorted(self.body, region.nodes)]
 
     def by_triangle(self, values: Sequence[np.ndarray]) -> np.ndarray:
-        """(T, ...) values in the triangles of biomass, in their order, from those (t, ...) of each
+        """(T, ...) values in all biomass triangles in mesh order, from values (t, ...) in each
         aggregate."""
         triangles = np.concatenate([region.triangles for region in self.regions])
         return np.concatenate(values)[np.argsort(triangles)]
 
     def moved(self, points: np.ndarray) -> Mesh:
-        """The same triangles with their nodes at ``points`` (N, 2); nodes of walls and ends must
-        still be on their lines."""
+        """The same triangles with their nodes at ``points`` (N, 2) um. Nodes on walls and ends must
+        stay on them."""
         return replace(self, points=points)
 
     def turned_over(self, selected: np.ndarray | slice = slice(None)) -> np.ndarray:
@@ -469,7 +475,7 @@ class Mesh:
         return elements.determinant(J).min(axis=1) <= 0
 
     def strained_arcs(self) -> tuple[np.ndarray, ...]:
-        """For each aggregate of a curved mesh, (M,) True where the triangle beside an arc of its
+        """For each aggregate of a curved mesh, (arcs,) True where a triangle beside an arc of its
         boundary is turned over."""
         bad = self.cells[self.turned_over(), 3:]
         return tuple(np.isin(loop[1::2], bad) for loop in self.topology.loops)
@@ -483,7 +489,7 @@ class Mesh:
         return self
 
     def acceptable(self) -> bool:
-        """Does the mesh pass the paper's criterion (3.5), with no triangle turned over?"""
+        """Does the mesh meet the paper's criterion (3.5), and is no triangle turned over?"""
         straight = self.areas.min() > 0 and np.count_nonzero(self.quality < POOR) <= POOR_ALLOWED
         return bool(straight) and not self.turned_over(self.topology.bent).any()
 
@@ -520,8 +526,8 @@ def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def curved(straight: Mesh, middles: Sequence[np.ndarray] | None) -> Mesh:
     """The mesh with a node in the middle of every edge.
 
-    middles: (M, 2) um, those on the boundary of each aggregate, in the order of its loop's edges;
-    None: middles of the straight edges.
+    middles: for each aggregate, (M, 2) um, middles of its boundary's edges in the order of the
+    loop. If None, all middles are those of the straight edges.
     """
     topology = straight.topology
     count = straight.corners

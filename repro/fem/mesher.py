@@ -1,4 +1,4 @@
-"""Mesh generation (3.1): place nodes on boundary, interface and contact; Mmg fills the inside.
+"""Mesh generation (3.1): this module places the boundary nodes, and Mmg fills the inside.
 
 Mmg (through mmgpy) starts from a constrained Delaunay triangulation (shapely) and keeps all
 prescribed edges.
@@ -28,13 +28,15 @@ from repro.fem.sizing import Sizing
 from repro.fem.walls import Wall, Walls
 from repro.timing import timed
 
-#: Element sizes in the first of two meshing passes over the final ones.
+#: Ratio of the element sizes in the first of two meshing passes to the final ones.
 FIRST_PASS = 2.0
-#: Mmg's own limit on the ratio of adjacent edges.
+#: Limit on the ratio of adjacent edges, enforced by Mmg.
 HGRAD = 1.5
-#: Nodes of a triangle lie on a line if its area is below this times its longest edge squared.
+#: The nodes of a triangle count as collinear if its area is below this times its longest edge
+#: squared.
 SLIVER = 1e-12
-#: Rounds in which arcs that bend too much for the triangles beside them are halved.
+#: Largest number of rounds in which arcs are halved, if they bend too much for the triangles beside
+#: them.
 HALVINGS = 12
 
 #: Nodes of a polygon, and the number of the aggregate that it encloses; zero for the fluid.
@@ -45,9 +47,10 @@ Regions: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
              geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
-    """Generate a mesh around one aggregate, or of a clean channel, by :func:`generate_around`.
+    """Generate a mesh around one aggregate, or of a clean channel (outline None).
 
-    outline: None for a clean channel.
+    Also returns the outline with the mesh's nodes. Arguments and errors are those of
+    :func:`generate_around`.
     """
     mesh, outlines = generate_around([] if outline is None else [outline], ends, sizing, geometry,
                                      method)
@@ -60,8 +63,9 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
     """Generate a mesh around aggregates; also returns the outlines with the mesh's nodes.
 
     ends: x of inlet and outlet (um); geometry: 1 for straight triangles, 2 for curved ones, as in
-    the outlines; method: of the linear systems on the mesh. Raises MeshError if an outline crosses
-    itself, another one or the channel's ends, or if a curved triangle is turned over.
+    the outlines; method: solver of the linear systems on the mesh. Raises MeshError if an outline
+    crosses itself, another outline, a wall or an end of the channel, or if a curved triangle is
+    turned over.
     """
     outlines = list(outlines)
     for _ in range(HALVINGS):
@@ -88,7 +92,7 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
 
 @dataclass(frozen=True, eq=False)
 class ElementSizes:
-    """Element sizes of a mesh, prescribed at the sources (K, 2) um: sizes (K,) um."""
+    """Element sizes of a mesh: sizes (K,) um are prescribed at the sources (K, 2) um."""
 
     sources: np.ndarray
     sizes: np.ndarray
@@ -96,7 +100,7 @@ class ElementSizes:
 
     @staticmethod
     def around(outlines: Sequence[Outline], sizing: Sizing) -> ElementSizes:
-        """Sizes for outlines, or the largest everywhere without any."""
+        """Sizes for outlines. Without outlines all elements have the largest size."""
         sources = [np.empty((0, 2))]
         sizes = [np.empty(0)]
         for outline, beside in sizes_of.each_beside(outlines, sizing):
@@ -106,11 +110,12 @@ class ElementSizes:
         return ElementSizes(np.concatenate(sources), np.concatenate(sizes), sizing)
 
     def at(self, where: np.ndarray) -> np.ndarray:
-        """(N,) um at points (N, 2) um."""
+        """(N,) um, sizes at points (N, 2) um."""
         return sizes_of.graded_size(where, self.sources, self.sizes, self.sizing)
 
     def path(self, *corners: np.ndarray) -> np.ndarray:
-        """(N, 2) um, nodes on straight lines from corner to corner (2,), without the last one."""
+        """(N, 2) um, nodes on straight lines from corner (2,) to corner, without the last corner.
+        """
         lines = [sizes_of.graded_line(start, end, self.sources, self.sizes, self.sizing)
                  for start, end in zip(corners, corners[1:])]
         return np.vstack([line[:-1] for line in lines])
@@ -118,7 +123,7 @@ class ElementSizes:
 
 def around(outlines: Sequence[Outline], ends: tuple[float, float], sizing: Sizing,
            method: Method = DEFAULT) -> Mesh:
-    """Generate a straight mesh around polygons, whose nodes stay unchanged.
+    """Generate a mesh of straight triangles around polygons, and keep the polygons' nodes.
 
     Arguments are those of :func:`generate_around`.
     """
@@ -134,8 +139,8 @@ def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> 
     """Raise MeshError if an outline crosses itself, a wall or an end of the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
-        raise MeshError("the outline of the aggregate crosses itself, and contact is modelled with "
-                        f"the walls alone: {shapely.is_valid_reason(polygon)}")
+        raise MeshError("the outline of the aggregate crosses itself, and contact is modelled only "
+                        f"with walls: {shapely.is_valid_reason(polygon)}")
     for wall in walls:
         gap = wall.gap(outline.points)
         if gap.min() < 0:
@@ -149,18 +154,18 @@ def check_outline(outline: Outline, ends: tuple[float, float], walls: Walls) -> 
 
 
 def check_apart(outlines: Sequence[Outline]) -> None:
-    """Raise MeshError if two outlines touch beside a weld."""
+    """Raise MeshError if two outlines touch elsewhere than in a weld."""
     united, _ = welds.united(outlines, welds.shared_points(outlines)[1])
     if not all(shapely.Polygon(outline.points).is_valid for outline in united):
-        raise MeshError("two welded aggregates touch beside their weld")
+        raise MeshError("two welded aggregates touch outside their weld")
     for outline, other in combinations(united, 2):
         if shapely.Polygon(outline.points).intersects(shapely.Polygon(other.points)):
-            raise MeshError("two aggregates touch, and contact is modelled with the walls alone")
+            raise MeshError("two aggregates touch, and contact is modelled only with walls")
 
 
 def _boundaries(outlines: Sequence[Outline], ends: tuple[float, float],
                 element_sizes: ElementSizes) -> tuple[np.ndarray, list[Polygon]]:
-    """All prescribed points (K, 2) and the polygons that they bound."""
+    """All prescribed points (K, 2) um, and the polygons between them."""
     walls = element_sizes.sizing.walls
     if not outlines:
         corners = _around(walls, ends)
@@ -181,14 +186,17 @@ def _around(walls: Sequence[Wall], ends: tuple[float, float]) -> np.ndarray:
 
 
 class _Fluid:
-    """The fluid around aggregates: one polygon between any two that touch both walls."""
+    """The fluid around aggregates, as polygons.
+
+    Aggregates that touch both walls separate the polygons.
+    """
 
     def __init__(self, outlines: Sequence[Outline], own: Sequence[np.ndarray], walls: Walls,
                  ends: tuple[float, float],
                  element_sizes: ElementSizes, store: _PointStore):
         self._outlines = outlines
         self._own = own
-        # The polygons run along the wall of a seed first.
+        # Each polygon starts along the wall of the first aggregate's seed.
         self._walls = outlines[0].seat.walls(walls)
         self._corners = _around(self._walls, ends)
         self._sizes = element_sizes
@@ -202,19 +210,19 @@ class _Fluid:
         return sorted(touching, key=lambda number: wall.normal * self._point(number, wall, 0)[0])
 
     def polygons(self) -> list[Polygon]:
-        """Nodes of the polygons, along the first wall."""
+        """The polygons, in their order along the first wall."""
         first, opposite = self._along
         spanning: list[int | None] = [number for number in first if number in opposite]
         return [(self._between(before, after), 0)
                 for before, after in zip([None, *spanning], [*spanning, None])]
 
     def _between(self, before: int | None, after: int | None) -> np.ndarray:
-        """The polygon between two aggregates that touch both walls, or an end of the mesh (None)
-        and one of them."""
+        """The polygon between two aggregates that touch both walls. None stands for an end of the
+        mesh in place of an aggregate."""
         first, opposite = self._walls
         corners = self._corners
         along = self._on_wall(0, before, after, corners[0], corners[1])
-        start = next(along)  # its new nodes have the first numbers, those beside it the last ones
+        start = next(along)  # the first piece along the wall gets the first new numbers
         around = [self._side(after, first, opposite, corners[1], corners[2]),
                   *self._on_wall(1, after, before, corners[2], corners[3]),
                   self._side(before, opposite, first, corners[3], corners[0])]
@@ -225,7 +233,8 @@ class _Fluid:
 
     def _on_wall(self, place: int, before: int | None, after: int | None, start: np.ndarray,
                  end: np.ndarray) -> Iterator[np.ndarray]:
-        """Pieces of nodes along a wall and around the aggregates on it, without the last node."""
+        """Consecutive nodes, in pieces, along a wall and around its aggregates, without the last
+        node."""
         wall = self._walls[place]
         order = self._along[place]
         beside = order[0 if before is None else order.index(before) + 1:
@@ -243,29 +252,29 @@ class _Fluid:
 
     def _side(self, number: int | None, wall: Wall, other: Wall, start: np.ndarray,
               end: np.ndarray) -> np.ndarray:
-        """Nodes of the side of an aggregate from wall to wall, or of an end of the mesh without the
-        last one."""
+        """Nodes from wall to wall: along the side of an aggregate, or along an end of the mesh
+        without the last node."""
         if number is None:
             return self._store.add(self._sizes.path(start, end))
         return self._surface(number, wall, other)
 
     def _surface(self, number: int, wall: Wall, other: Wall) -> np.ndarray:
-        """Nodes of an aggregate from its first one on a wall to its last one on another wall, or on
-        the same."""
+        """Nodes of an aggregate from its first node on a wall to its last node on ``other``, which
+        may be the same wall."""
         outline = self._outlines[number]
         first, _ = _contact(outline, wall)
         _, last = _contact(outline, other)
         return self._own[number][_backwards(first, last, len(outline.points))]
 
     def _point(self, number: int, wall: Wall, last: int) -> np.ndarray:
-        """(2,) um, the first point (0) of an aggregate on a wall along the fluid, or the last (1).
-        """
+        """(2,) um, the first (last = 0) or last (last = 1) point of an aggregate on a wall, in the
+        direction of the fluid's boundary."""
         outline = self._outlines[number]
         return outline.points[_contact(outline, wall)[last]]
 
 
 def _contact(outline: Outline, wall: Wall) -> tuple[int, int]:
-    """The outline's first and last node on a wall, in the direction of the boundary."""
+    """The outline's first and last node on a wall, in the direction of the fluid's boundary."""
     nodes = np.flatnonzero(outline.wall == wall.number)
     along = wall.normal * outline.points[nodes, 0]
     return int(nodes[np.argmin(along)]), int(nodes[np.argmax(along)])
@@ -284,17 +293,16 @@ class _PointStore:
 
 
 def _backwards(first: int, last: int, count: int) -> np.ndarray:
-    """Loop indices from first to last, both included, walking clockwise."""
+    """Loop indices from first to last, clockwise, both included."""
     return (first - np.arange((first - last) % count + 1)) % count
 
 
 def _fill(points: np.ndarray, polygons: list[Polygon],
           size_at: Callable[[np.ndarray], np.ndarray]) -> tuple[Regions, np.ndarray]:
-    """Triangles inside the polygons, of size (um) ``size_at(points)``, and the new indices of the
-    prescribed points.
+    """Triangles inside the polygons, and the indices of the prescribed points among the new points.
 
-    The first pass uses the sizes at the prescribed points, the second one those at all points of
-    the first.
+    size_at(points): element sizes (um). The first pass uses sizes at the prescribed points, the
+    second pass uses sizes at all points of the first one.
     """
     triangles = [_constrained_delaunay(points, nodes) for nodes, _ in polygons]
     region = np.repeat([1 + number for _, number in polygons], [len(t) for t in triangles])
@@ -312,7 +320,10 @@ def _fill(points: np.ndarray, polygons: list[Polygon],
 
 def _mmg(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, rim: np.ndarray,
          prescribed: np.ndarray, sizes: np.ndarray) -> tuple[Regions, np.ndarray]:
-    """Run one pass of Mmg, which keeps the rim; also returns the indices of prescribed points."""
+    """Run one pass of Mmg. It keeps the edges ``rim`` (K, 2).
+
+    Also returns the indices of the prescribed points among the new points.
+    """
     mmg = MmgMesh2D()
     mmg.set_mesh_size(vertices=len(points), triangles=len(triangles), quadrilaterals=0,
                       edges=len(rim))
@@ -357,9 +368,9 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def _without_slivers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The triangles (K, 3) without those with three nodes on one line, which Mmg refuses.
+    """The triangulation (K, 3) without collinear triangles, which Mmg refuses.
 
-    The longest edge of a removed triangle is exchanged for the other diagonal.
+    The longest edge of a collinear triangle is exchanged for the other diagonal.
     """
     corners = points[triangles]
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
@@ -385,11 +396,11 @@ def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def unlocked(straight: Mesh) -> Mesh:
-    """The same nodes without triangles that have two edges on the boundary of their region.
+    """Exchange diagonals so that no triangle has two edges on the boundary of its region.
 
-    A region is the fluid or an aggregate. In these triangles linear pressures leave quadratic
-    displacements too little freedom. If possible, the corner's inner edge is exchanged for the
-    other diagonal.
+    A region is the fluid or an aggregate. A triangle with two such edges locks: its linear pressure
+    leaves the quadratic displacement too little freedom. If possible, its inner edge is exchanged
+    for the other diagonal.
     """
     triangles = straight.triangles.copy()
     region = straight.topology.region
@@ -412,16 +423,19 @@ def _cornered(triangles: np.ndarray, region: np.ndarray) -> np.ndarray:
 
 
 def _flip(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, corner: int) -> None:
-    """Exchange, in place, the inner edge of a cornered triangle for the other diagonal of the
-    quadrilateral that it forms with its neighbour."""
+    """Exchange, in place, the inner edge of a triangle that has two edges on the boundary of its
+    region (see :func:`_exchange`)."""
     outer = _region_edges(triangles, region)[corner]
     if outer.sum() == 2:
         _exchange(points, triangles, corner, int(np.flatnonzero(~outer)[0]))
 
 
 def _exchange(points: np.ndarray, triangles: np.ndarray, triangle: int, edge: int) -> None:
-    """Exchange, in place, an edge of a triangle for the other diagonal of the quadrilateral that
-    it forms with its neighbour, unless a new triangle is then turned over."""
+    """Exchange, in place, an edge of a triangle for the other diagonal.
+
+    The triangle and its neighbour form a quadrilateral. The edge stays if a new triangle would be
+    turned over.
+    """
     c, a, b = np.roll(triangles[triangle], -edge)
     sharing = np.flatnonzero((triangles == a).any(axis=1) & (triangles == c).any(axis=1))
     beside = int(sharing[sharing != triangle][0])

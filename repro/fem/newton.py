@@ -1,7 +1,8 @@
 """Newton's method, full or modified (with the derivative of an earlier iterate).
 
 With the derivative of an earlier iterate the defect decreases linearly instead of quadratically.
-This is far cheaper on a large mesh, where the factorisation dominates the cost of a step.
+The modified method is still far cheaper on a large mesh: there the factorisation dominates the cost
+of an iteration.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import numpy as np
 from repro.fem.assembly import Factored
 from repro.polling import poll
 
-#: The modified method keeps a factorisation while each step reduces the defect by this factor.
+#: The modified method keeps a factorisation as long as each iteration reduces the defect to at most
+#: this part.
 REQUIRED_REDUCTION = 0.01
-#: The iteration stalls at round-off if a step reduces the defect by less than this factor.
+#: The iteration stalls at round-off if the defect stays above this part of the previous one.
 STALLED = 0.1
 
 
@@ -49,10 +51,9 @@ class System(Protocol[State]):
 class Newton:
     """Newton's method.
 
-    tolerance: of the defect; round_off: accepted defect when the iteration stalls; most: largest
-    number of iterations; modified_newton: keep the derivative while it suffices?; early:
-    (iterations, defect); the method gives up if its defect is larger than this after this number of
-    iterations.
+    tolerance: of the defect; round_off: accepted defect if the iteration stalls; most: largest
+    number of iterations; modified_newton: does the method keep the derivative while it suffices?;
+    early: (n, defect): the method gives up if the defect after n iterations is larger.
     """
 
     tolerance: float

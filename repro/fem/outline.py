@@ -1,9 +1,8 @@
 """The aggregate's boundary (2.3.3): a closed chain of straight edges or of parabolic arcs.
 
-The channel is 0 <= y <= W, -L/2 <= x <= L/2; the origin is below the middle of the seed, on the
-lower wall. Nodes run counterclockwise; each of them is FREE (on the interface with the fluid), or
-touches a wall (:mod:`repro.fem.walls`). Where edges are arcs, corners and middles alternate: arc k
-has the nodes 2 k, 2 k + 1 and 2 k + 2.
+The channel is 0 <= y <= W, -L/2 <= x <= L/2. Nodes run counterclockwise. Each node is FREE (on the
+interface with the fluid), touches a wall, or is welded (:mod:`repro.fem.walls`). If edges are arcs,
+corners and middles alternate: arc k has the nodes 2 k, 2 k + 1 and 2 k + 2.
 """
 
 from __future__ import annotations
@@ -19,10 +18,11 @@ from repro.errors import OutsidePore
 from repro.fem.brief import brief
 from repro.fem.walls import FREE, Seat, Wall, Walls, channel_walls, numbers_at, on_any
 
-#: A corner of the shape at t = 0 that keeps its node turns by more than this. The samples of a
-#: spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
+#: A corner of the shape at t = 0 keeps its node if the boundary turns there by more than this. The
+#: samples of a spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
 SHARP = np.pi / 3
-#: Straight lines in place of an arc, for distances: they err by up to 1/256 of the arc's sag.
+#: Number of straight lines that replace an arc to compute distances. They err by up to 1/256 of the
+#: arc's sag.
 ON_ARC = 16
 
 
@@ -31,9 +31,9 @@ ON_ARC = 16
 class Outline:
     """Boundary of the aggregate.
 
-    points: (M, 2) um; wall: (M,) number of the wall, or FREE; fixed: (M,) True where x is always
-    fixed; origin: (M, 2) um, where the material of each node was at t = 0; geometry: 1, edges are
-    straight; 2, they are arcs; seat: where its seed sat.
+    points: (M, 2) um; wall: (M,) number of the wall that each node touches, FREE or WELD; fixed:
+    (M,) True where x is always fixed; origin: (M, 2) um, position of each node's material at t = 0;
+    geometry: 1 for straight edges, 2 for arcs; seat: position of its seed.
     """
 
     points: np.ndarray
@@ -55,23 +55,24 @@ class Outline:
 
     @property
     def thickness(self) -> float:
-        """Largest distance (um) from the wall of its seed: the paper's R_aggregate."""
+        """Largest distance (um) of the boundary from its seed's wall: the paper's R_aggregate."""
         first = np.flatnonzero(self.wall == self.seat.wall)[0]
         return float(np.abs(self._extreme_points[:, 1] - self.points[first, 1]).max())
 
     def nearest(self, wall: Wall) -> tuple[float, float]:
-        """The thinnest film (um) at a wall, and x (um) of this point."""
+        """Least thickness (um) of the film at a wall, and x (um) of its thinnest point."""
         points = self._extreme_points
         point = points[np.argmin(wall.normal * points[:, 1])]
         return float(wall.film(point)), float(point[0])
 
     def untouched(self, walls: Walls) -> Walls:
-        """The walls that no node touches, the nearest one first."""
+        """The walls that no node touches; the nearest wall comes first."""
         free = [wall for wall in walls if not (self.wall == wall.number).any()]
         return tuple(sorted(free, key=lambda wall: self.nearest(wall)[0]))
 
     def gap(self, walls: Walls) -> float:
-        """The thinnest film (um) at a wall without contact, infinite if it touches all of them."""
+        """Least thickness (um) of the films at walls without contact; infinite if all are touched.
+        """
         return min((self.nearest(wall)[0] for wall in self.untouched(walls)), default=inf)
 
     def distances(self, points: np.ndarray) -> np.ndarray:
@@ -79,8 +80,8 @@ class Outline:
         return shapely.distance(shapely.points(points), self._ring)
 
     def film(self, other: Outline) -> tuple[float, np.ndarray]:
-        """The thinnest film (um) between two aggregates, zero if they touch, and (2,) um, its
-        middle."""
+        """Least thickness (um) of the film to another aggregate, zero if they touch; and (2,) um,
+        the middle of the film there."""
         line = shapely.shortest_line(shapely.Polygon(self._ring), shapely.Polygon(other._ring))
         return float(line.length), shapely.get_coordinates(line).mean(axis=0)
 
@@ -104,8 +105,8 @@ class Outline:
 
     @cached_property
     def area(self) -> float:
-        """Area inside (um2): that of the corners' polygon, and two thirds of chord times height of
-        each arc."""
+        """Area inside (um2): the area of the corners' polygon plus, for each arc, two thirds of
+        chord times height."""
         a, m, b = np.moveaxis(self.arcs(self.points), 1, 0)
         chord = b - a
         bow = m - 0.5 * (a + b)
@@ -131,7 +132,7 @@ class Outline:
         return edges[:, :: 3 - self.geometry].astype(int)
 
     def contact_length(self, wall: Wall) -> float:
-        """Length (um) of its contact surface with a wall."""
+        """Length (um) of the contact surface with a wall."""
         ends = self.points[self.edges_on(wall.number)[:, [0, -1]], 0]
         return float(np.abs(ends[:, 1] - ends[:, 0]).sum())
 
@@ -156,7 +157,7 @@ class Outline:
     def interface_edges(self) -> np.ndarray:
         """(M,) True where the line from node i to node i + 1 borders the fluid.
 
-        Its ends are then not both on one wall.
+        Such a line does not have both ends on one wall.
         """
         return (self.wall == FREE) | (self.wall != np.roll(self.wall, -1))
 
@@ -170,7 +171,7 @@ class Outline:
 
     @cached_property
     def _extreme_points(self) -> np.ndarray:
-        """(K, 2) um, points among which x and y have their extremes."""
+        """(K, 2) um, points that include the extremes of x and of y."""
         return np.concatenate([self._peaks(), self.points])
 
     def _peaks(self) -> np.ndarray:
@@ -212,9 +213,9 @@ def arc_derivatives(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0.0,
               wall: Wall | None = None) -> Outline:
-    """Half-disc of a radius (um) on a wall, around x = ``middle`` (um), its fixed point.
+    """Half-disc of a radius (um) on a wall. Its centre x = ``middle`` (um) is its fixed point.
 
-    across: elements over its radius; wall: the lower one, y = 0, by default.
+    across: number of elements over the radius; wall: the lower wall, y = 0, by default.
     """
     wall = wall or channel_walls(inf)[0]
     edges = 2 * int(np.ceil(np.pi / 2 * across))
@@ -237,13 +238,13 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
 
 def polygon(corners: np.ndarray, walls: Walls, geometry: int = 1, smooth: bool = False,
             at_tips: float = inf, bends: bool = False) -> Outline:
-    """The outline of an aggregate through points (K, 2) um, from the first wall to the first wall.
+    """The outline of an aggregate on the first wall, through points (K, 2) um.
 
-    The points go from the upstream to the downstream end; those on the second wall are contact.
-    smooth: a natural cubic spline replaces the straight line between two points unless both are
-    contact. at_tips: length (um) of the edges at tips; edges grow away from tips. bends: the flow
-    bends the aggregate about its contact lines, which then count as tips. The middle of each
-    contact surface is its fixed point, if its wall keeps one. Raises OutsidePore where the curve
+    corners: from the upstream to the downstream end; points on the second wall are contact.
+    smooth: a natural cubic spline replaces the straight line between two points, unless both are
+    contact. at_tips: length (um) of the edges at tips; edges grow away from tips. bends: does the
+    flow bend the aggregate about its contact lines? They then count as tips. The middle of each
+    contact surface is its fixed point, if its wall keeps one. Raises OutsidePore if the curve
     leaves the pore.
     """
     first, *_ = walls
@@ -275,28 +276,29 @@ def polygon(corners: np.ndarray, walls: Walls, geometry: int = 1, smooth: bool =
 
 
 def _upside_down(points: np.ndarray, level: float) -> np.ndarray:
-    """Points (K, 2) um mirrored at half of a level (um)."""
+    """Points (K, 2) um mirrored at y = level / 2 (um)."""
     return np.asarray(points, float) * [1.0, -1.0] + [0.0, level]
 
 
 #: Corners that turn by more than this angle have smaller edges beside them.
 CORNER = np.radians(30.0)
-#: Length of edges at a notch, over that at a tip, which juts into the water.
+#: Ratio of the edge length at a notch to that at a tip. A tip juts into the water.
 AT_NOTCH = 3.0
 #: Ratio of successive distances from a corner to the nodes beside it.
 CORNER_RATIO = 3.0
 
 
 def _graded_to_corners(rim: np.ndarray, walls: Walls, least: float, bends: bool) -> np.ndarray:
-    """Points (M, 2) on the lines between points (K, 2), closer and closer to each corner.
+    """Points (M, 2) um on the lines between points (K, 2) um, denser towards each corner.
 
-    At a sharp tip the water's velocity gradient grows as the distance to the power of -1/2, and the
-    error of the head loss falls with the first power of the element size there. Strain in a notch
-    grows in the same way. If the aggregate spans the pore, the water passes through it, and its
-    contact lines count as tips. They also do if the aggregate bends, as it does in the traction
-    form: beside a contact line with 55 to 150 degrees of biomass the velocity then grows as the
-    distance to the power of 0.85 to 0.52 (viscosity ratio 2000; 0.595 at 90 degrees). In the
-    Laplacian form this power is above 1 up to 95 degrees.
+    least: length (um) of the edges at tips. At a sharp tip the velocity gradient of the water grows
+    as the distance to the power of -1/2, and the error of the head loss is of first order in the
+    element size there. Strain in a notch grows in the same way.
+
+    Contact lines count as tips in two cases. If the aggregate spans the pore, the water passes
+    through it. If the aggregate bends, as in the traction form, the velocity beside a contact line
+    with 55 to 150 degrees of biomass grows as the distance to the power of 0.85 to 0.52 (viscosity
+    ratio 2000; 0.595 at 90 degrees). In the Laplacian form this power is above 1 up to 95 degrees.
     """
     way = np.diff(rim, axis=0)
     angle = np.arctan2(way[:, 1], way[:, 0])
@@ -314,7 +316,7 @@ def _graded_to_corners(rim: np.ndarray, walls: Walls, least: float, bends: bool)
 
 
 def _shares(length: float, first: float, last: float) -> np.ndarray:
-    """Positions of the nodes on a line of a length (um), from 0 to 1, without 1.
+    """Positions, in [0, 1), of the nodes on a line of a length (um).
 
     first, last: lengths (um) of the edges at its ends, infinite where these are no corners.
     """
@@ -322,18 +324,19 @@ def _shares(length: float, first: float, last: float) -> np.ndarray:
 
 
 def _ladder(least: float) -> np.ndarray:
-    """Numbers from ``least`` up to a third at most, each CORNER_RATIO times the one before."""
+    """Numbers from ``least`` to at most a third; each is CORNER_RATIO times the one before."""
     count = int(np.log(max(1.0, 1 / least)) / np.log(CORNER_RATIO))
     return least * CORNER_RATIO ** np.arange(count)
 
 
-#: Points of a spline for each interpolated point, and the largest number in all.
+#: Points on a spline for each interpolated point, and the largest number of points on all of it.
 BETWEEN = 8
 MOST_SPLINED = 1000
 
 
 def _splined(rim: np.ndarray, walls: Walls) -> np.ndarray:
-    """Points (M, 2) on a spline through points (K, 2), straight along a wall."""
+    """Points (M, 2) um on a spline through points (K, 2) um. Along a wall the spline is straight.
+    """
     from scipy.interpolate import CubicSpline  # its import takes 0.25 s; few scenes need it
 
     length = np.sqrt(np.linalg.norm(np.diff(rim, axis=0), axis=1))
@@ -374,7 +377,7 @@ def _middles(points: np.ndarray, walls: Walls) -> np.ndarray:
 
 def _with_arc_middles(points: np.ndarray, wall: np.ndarray,
                       fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Alternate corners and middles of straight edges."""
+    """Insert the middle of each straight edge: points (2 M, 2) um, walls (2 M,), fixed (2 M,)."""
     after = np.roll(points, -1, axis=0)
     both = np.stack([points, 0.5 * (points + after)], axis=1).reshape(-1, 2)
     between = np.where(wall == np.roll(wall, -1), wall, FREE)

@@ -1,13 +1,13 @@
-"""An outline of arcs that recedes along its normal.
+"""Recession of an outline of arcs along its normal.
 
 A node of a free surface moves against the outward normal n by a distance d. A corner of two arcs
-moves to where their receded tangents meet, by -d (n1 + n2) / (1 + n1 . n2). A contact line moves to
-where the receded surface meets the wall: along it, by d over the sine of the contact angle. Nodes
-of a contact surface keep their order between its ends; its fixed point stays in place as long as
-the lines do not pass it.
+moves by -d (n1 + n2) / (1 + n1 . n2), to the intersection of their receded tangents. A contact line
+moves along the wall by d over the sine of the contact angle, to the intersection of the receded
+surface with the wall. Nodes of a contact surface keep their order between its ends. Its fixed point
+stays in place until a contact line passes it.
 
-The surface passes arcs beside a contact line whose angle is acute, and at convex corners. Such arcs
-join a neighbour before the surface recedes (:func:`merged`).
+Arcs at convex corners and beside contact lines with an acute angle shrink as the surface recedes.
+If they shrink too much, they join a neighbour before the surface recedes (:func:`merged`).
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from repro.errors import ContactEroded, ErosionError
 from repro.fem.outline import ON_ARC, Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Walls
 
-#: An arc joins a neighbour if the receded surface keeps less than this part of one of its halves.
-#: The middle of an arc is then a third to two thirds along its chord; beyond a quarter it folds.
+#: An arc joins a neighbour if the recession leaves less than this part of one of its halves. The
+#: middle of each other arc then lies between 1/3 and 2/3 of its chord; outside 1/4 to 3/4 an arc
+#: folds.
 KEPT = 0.5
-#: The middle of an arc moves along it to the middle of its chord if it is farther from that than
-#: this part of the chord.
+#: The middle of an arc moves along the arc to the middle of the chord if its distance from there is
+#: above this part of the chord.
 CENTRED = 0.1
 
 
 def normals(outline: Outline) -> np.ndarray:
-    """(E, 3, 2) unit normals out of the aggregate at start, middle and end of each arc; an outline
-    runs counterclockwise."""
+    """(E, 3, 2) outward unit normals at start, middle and end of each arc."""
     first, second = arc_derivatives(outline.arcs(outline.points))
     x, y = np.stack([first + t * second for t in (0.0, 0.5, 1.0)], axis=1).transpose(2, 0, 1)
     return np.stack([y, -x], axis=-1) / np.hypot(x, y)[..., None]
 
 
 def directions(outline: Outline) -> np.ndarray:
-    """(M, 2) moves of the nodes for a surface that recedes by 1 um; zero within contact surfaces.
+    """(M, 2) um, moves of the nodes if the surface recedes by 1 um; zero within contact surfaces.
     """
     starts, middles, ends = np.moveaxis(normals(outline), 1, 0)
     free = outline.edge_wall == FREE
@@ -55,8 +55,8 @@ def directions(outline: Outline) -> np.ndarray:
 
 
 def moved(outline: Outline, moves: np.ndarray) -> Outline:
-    """The outline with its free nodes and contact lines moved (M, 2) um; the nodes between contact
-    lines follow."""
+    """The outline after moves (M, 2) um of its free nodes and contact lines. Nodes between contact
+    lines follow. Raises ContactEroded if a contact surface vanishes."""
     points = outline.points + moves
     on = outline.wall != FREE
     points[on, 1] = outline.points[on, 1]
@@ -67,7 +67,10 @@ def moved(outline: Outline, moves: np.ndarray) -> Outline:
 
 
 def _between_lines(outline: Outline, surface: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(k,) um, places of the nodes ``surface`` (k,) of a contact surface whose lines are at x."""
+    """(k,) um, x of the nodes ``surface`` (k,) of a contact surface after its lines have moved.
+
+    x: (M,) um, of all nodes, with the new positions of the lines.
+    """
     ends = surface[outline.contact_ends[surface]]
     low, high = x[ends].min(), x[ends].max()
     before = outline.points[surface, 0]
@@ -81,8 +84,11 @@ def _between_lines(outline: Outline, surface: np.ndarray, x: np.ndarray) -> np.n
 
 
 def merged(outline: Outline, moves: np.ndarray) -> Outline | None:
-    """The outline without the arc that shrinks most under moves (M, 2) um, which joins the smoother
-    of its neighbours; None if all arcs keep KEPT of their halves."""
+    """The outline after the arc that shrinks most under moves (M, 2) um has joined a neighbour.
+
+    It joins the neighbour with the smoother corner. Returns None if all arcs keep KEPT of both
+    halves. Raises ErosionError if too few arcs are left.
+    """
     before = _halves(outline.points)
     kept = np.sum(before * _halves(outline.points + moves), axis=1) / np.sum(before**2, axis=1)
     kept = kept.reshape(-1, 2).min(axis=1)
@@ -105,11 +111,11 @@ def _halves(points: np.ndarray) -> np.ndarray:
 
 
 def _centred(outline: Outline) -> Outline:
-    """The outline with the middles of its arcs about the middles of their chords."""
+    """The outline with the middle of each free arc moved near the middle of its chord."""
     arcs = outline.arcs(outline.points)
     chords = arcs[:, 2] - arcs[:, 0]
     part = np.sum((arcs[:, 1] - arcs[:, 0]) * chords, axis=1) / np.sum(chords**2, axis=1)
-    t = 1 / (4 * part - 1 + np.sqrt(1 + 4 * (2 * part - 1) ** 2))  # half of the chord there
+    t = 1 / (4 * part - 1 + np.sqrt(1 + 4 * (2 * part - 1) ** 2))  # projects to half the chord
     far = (np.abs(part - 0.5) > CENTRED) & (outline.edge_wall == FREE)
     points = outline.points.copy()
     points[1::2][far] = np.einsum("ea,eai->ei", parabola(t[far]), arcs[far])
@@ -117,8 +123,10 @@ def _centred(outline: Outline) -> Outline:
 
 
 def _joined(outline: Outline, joint: int) -> Outline:
-    """The outline with one arc in place of the two that meet at a corner. Its middle is that of the
-    two arcs' length."""
+    """The outline with one arc in place of the two arcs that meet at corner ``joint``.
+
+    The middle of the new arc halves their total length.
+    """
     nodes = np.arange(2 * joint - 2, 2 * joint + 3) % len(outline.points)
     pair = outline.points[nodes]
     t = np.arange(ON_ARC + 1) / ON_ARC

@@ -1,7 +1,7 @@
-"""Smaller triangles in a mesh, by bisection of longest edges (Rivara 1984).
+"""Refinement of a mesh by bisection of longest edges (Rivara 1984).
 
-Each part lies in one triangle of the mesh and is its image under the same map, so a shape and its
-fields stay unchanged to round-off. A new mesh by :mod:`repro.fem.mesher` interpolates them.
+Each new triangle, a part, lies in one triangle of the mesh and uses its map. So shape and fields
+stay unchanged to round-off. A new mesh of :mod:`repro.fem.mesher` would interpolate them.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from repro.fem.outline import Outline
 from repro.fem.sizing import SPLIT, placed
 from repro.fem.transfer import Located
 
-#: Coordinates nearer to a wall or an end than this times the width lie on it; places on a unit
-#: triangle that differ by less are the same.
+#: A point lies on a wall or an end if it is nearer than this times the width. Points on the unit
+#: triangle are the same if they differ by less than this.
 ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Bisection:
-    """A mesh of parts of the triangles of another one, its parent.
+    """A mesh whose triangles are parts of the triangles of another mesh, its parent.
 
-    outlines: of the parts; owner: (T,) triangle of the parent in which each part lies; local:
-    (T, 3, 2) corners of each part on the unit triangle of that one. The corners of the parent come
-    first among those of the parts.
+    outlines: of the aggregates, with the nodes of ``mesh``; owner: (T,) triangle of the parent that
+    contains each part; local: (T, 3, 2) corners of each part on the owner's unit triangle. The
+    parent's corners have the first numbers.
     """
 
     parent: Mesh
@@ -40,7 +40,7 @@ class Bisection:
     local: np.ndarray
 
     def nodal(self, values: np.ndarray) -> np.ndarray:
-        """Values at the nodes of the parts, from those (N, ...) at the parent's nodes."""
+        """Values at the nodes of the parts, from values (N, ...) at the parent's nodes."""
         return self._nodes.field(values, self.parent.cells)
 
     def at_corners(self, values: np.ndarray) -> np.ndarray:
@@ -53,25 +53,26 @@ class Bisection:
         return field
 
     def restricted(self, values: np.ndarray) -> np.ndarray:
-        """(N, ...) values at the parent's nodes, from those at the nodes of the parts."""
+        """(N, ...) values at the parent's nodes, from values at the nodes of the parts."""
         return values[self._parent_nodes]
 
     def of_each(self, amounts: Sequence[np.ndarray], weights: Sequence[np.ndarray],
                 part_weights: Sequence[np.ndarray], table: Table) -> list[np.ndarray]:
-        """Amounts at the points of the parts of each aggregate, from those in its triangles.
+        """Amounts at the quadrature points of the parts, from amounts in the parent, by aggregate.
 
-        In a triangle, the amount over its weight is replaced by the linear function that fits it
-        best, limited to its range. The parts of a triangle keep its sum.
+        A linear function is fitted to the amount over weight in a triangle, and is limited to its
+        range. The triangle's parts get its values, scaled so that the triangle's total stays the
+        same.
 
-        amounts, weights: (t, q) of each aggregate in the parent; part_weights: (t, q) of each in
-        the parts; table: functions at the points of a triangle.
+        amounts, weights: for each aggregate, (t, q) in the parent; part_weights: for each
+        aggregate, (t, q) in the parts; table: functions at the points of a triangle.
         """
         each = zip(amounts, weights, part_weights, strict=True)
         return [self._split(number, *one, table) for number, one in enumerate(each)]
 
     def _split(self, number: int, amount: np.ndarray, weight: np.ndarray,
                part_weight: np.ndarray, table: Table) -> np.ndarray:
-        """:meth:`of_each` of one aggregate, by its place in the list."""
+        """:meth:`of_each` for the aggregate with index ``number``."""
         triangles = self.mesh.regions[number].triangles
         row = np.searchsorted(self.parent.regions[number].triangles, self.owner[triangles])
         density = amount / weight
@@ -86,7 +87,7 @@ class Bisection:
 
     @cached_property
     def _parent_nodes(self) -> np.ndarray:
-        """(N,) numbers, among the nodes of the parts, of the parent's nodes."""
+        """(N,) number of each of the parent's nodes in the mesh of the parts."""
         nodes = elements.nodes(self.mesh.geometry)
         distance = np.abs(_within(self.local, nodes)[:, :, None] - nodes).max(axis=3)
         part, node, place = np.nonzero(distance < ROUND_OFF)
@@ -96,7 +97,8 @@ class Bisection:
 
     @cached_property
     def _nodes(self) -> Located:
-        """Where the nodes of the parts lie in the parent; those of an aggregate lie in it."""
+        """Location in the parent of each node of the parts. A node of an aggregate is located in a
+        triangle of the aggregate."""
         cells = self.mesh.cells
         inside_first = np.argsort(~self.mesh.biomass, kind="stable")
         _, first = np.unique(cells[inside_first], return_index=True)
@@ -107,8 +109,11 @@ class Bisection:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Triangles (T, 3) between corners (N, 2) um, in triangles of a mesh; middles: the corner
-    between two others (smaller number first) whose edge was cut."""
+    """Parts of the triangles of a mesh.
+
+    points: (N, 2) um, corners; triangles: (T, 3); owner, local: as in :class:`Bisection`; middles:
+    {(smaller, larger corner of a cut edge): corner in its middle}.
+    """
 
     points: np.ndarray
     triangles: np.ndarray
@@ -151,15 +156,16 @@ def refined(mesh: Mesh, outlines: Sequence[Outline],
 
 
 def _bisected(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray]) -> _Parts:
-    """Cut the longest edges of triangles that are too large, and those that keep the mesh without
-    hanging nodes. The parts themselves if there are none."""
+    """Cut the longest edges of triangles that are too large, and further edges so that no node
+    hangs. Returns ``parts`` itself if no triangle is too large."""
     triangles = parts.triangles
     corners = parts.points[triangles]
     lengths = np.linalg.norm(corners[:, elements.NEXT] - corners, axis=2)
     large = lengths.max(axis=1) > SPLIT * size(corners.mean(axis=1))
     if not large.any():
         return parts
-    # The longest edge 01 first: both triangles beside an edge compare the same lengths.
+    # Turn each triangle so that its longest edge is 01. Both triangles beside an edge have the same
+    # length of it, to the last bit.
     turn = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
     rows = np.arange(len(triangles))[:, None]
     v = triangles[rows, turn]
@@ -196,17 +202,18 @@ def _bisected(mesh: Mesh, parts: _Parts, size: Callable[[np.ndarray], np.ndarray
 
 
 def _mapped(mesh: Mesh, owner: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """(K, 2) um of places (K, 2) on the unit triangles of a mesh's triangles (K,)."""
+    """(K, 2) um, images of points (K, 2) of the unit triangle in triangles ``owner`` (K,)."""
     return Located(owner, local).field(mesh.points, mesh.cells)
 
 
 def _within(corners: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """(T, q, 2) places of points (q, 2) of the unit triangle between corners (T, 3, 2)."""
+    """(T, q, 2) images of points (q, 2) of the unit triangle in triangles with corners (T, 3, 2).
+    """
     return np.einsum("qc,tci->tqi", elements.values(1, local), corners)
 
 
 def _along(parts: _Parts, loop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners of a loop (M,) after its edges were cut, the edge of each, and its place on it."""
+    """Corners (K,) of a loop (M,) after its edges were cut; the edge (K,) of each; t (K,) on it."""
     found = []
 
     def walk(a: int, b: int, edge: int, start: float, end: float) -> None:
@@ -225,14 +232,14 @@ def _along(parts: _Parts, loop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _with_middles(t: np.ndarray) -> np.ndarray:
-    """(2 K,) places on an edge, each with the middle between it and the next one."""
+    """(2 K,) t on edges: each of t (K,), and the middle between it and the next one."""
     after = np.append(t[1:], 0.0)
     return np.column_stack([t, 0.5 * (t + np.where(after > t, after, 1.0))]).ravel()
 
 
 def _meshed(mesh: Mesh, parts: _Parts, loops: tuple[np.ndarray, ...],
             outlines: list[Outline]) -> Mesh:
-    """The mesh of the parts, its loops on the outlines."""
+    """The mesh of the parts. The nodes of its loops are the points of the outlines."""
     straight = Mesh.of(_on_lines(mesh, parts.points), parts.triangles,
                        mesh.topology.region[parts.owner], loops, mesh.walls, mesh.ends,
                        mesh.topology.method)
@@ -247,7 +254,7 @@ def _meshed(mesh: Mesh, parts: _Parts, loops: tuple[np.ndarray, ...],
 
 
 def _on_lines(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """Points (N, 2) um; those beside a wall or an end, to round-off, are on it."""
+    """Points (N, 2) um; points within round-off of a wall or an end are moved onto it."""
     points = points.copy()
     near = ROUND_OFF * mesh.width
     for axis, levels in enumerate((mesh.ends, [wall.y for wall in mesh.walls])):

@@ -15,18 +15,18 @@ from numpy.typing import ArrayLike
 from repro.fem.outline import Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, WELD, Walls, numbered, touches_wall, whole_width, width_between
 
-#: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
+#: Number of elements across the pore's width, across the aggregate's thickness and across a film.
 ACROSS_PORE = 14.0
 ACROSS_AGGREGATE = 10.0
 ACROSS_FILM = 10.0
-#: Size beside the contact lines of a new mesh, over the size where a step ends. In ``fast`` lengths
-#: of contact err by 1.0, 0.2, 0.15 and 0.02 % with 4, by 0.5, 0.02, 0.06 and 0.25 % with 8, and by
-#: 2.4, 0.6, 0.8 and 0.5 % without smaller triangles (``growth-gold-contact``). With 8 the time in
-#: contact doubles.
+#: Element size beside the contact lines of a new mesh, over the size at the end of a step. In
+#: ``fast`` contact lengths err by 1.0, 0.2, 0.15 and 0.02 % with 4, by 0.5, 0.02, 0.06 and 0.25 %
+#: with 8, and by 2.4, 0.6, 0.8 and 0.5 % without smaller triangles (``growth-gold-contact``). With
+#: 8 the computing time in contact doubles.
 PARTS_OF_CONTACT = 4.0
-#: Limit on the elements along the interface, at refinement 1, that follow from the thickness. A
-#: half-disc has 31; a body more than 60 times longer than thick reaches the limit. With 200 or 400
-#: slivers fail at their first new mesh, with 4000 a step takes minutes.
+#: The aggregate's thickness sets at most this number of elements along the interface, at refinement
+#: 1. A half-disc has 31. A body more than 60 times longer than thick reaches the limit. With 200 or
+#: 400, runs with a sliver fail at their first new mesh; with 4000, a step takes minutes.
 ALONG_INTERFACE = 600.0
 #: Growth of the element size with the distance from its source; zero: one size everywhere.
 GRADATION = 0.25
@@ -40,10 +40,10 @@ DISTANCES = 2**20
 class Sizing:
     """Element sizes of a mesh.
 
-    walls: of the pore; refinement: divisor of the sizes; film: thickness of the thinnest
-    resolved film (um); gradation: growth of the size with the distance from its source; front:
-    further divisor of sizes at the aggregate, for a sharp front of the substrates; contact: size
-    beside the contact lines with the opposite wall (um), infinite for none; film_refinement:
+    walls: of the pore; refinement: divisor of the sizes; film: thickness (um) of the thinnest
+    resolved film; gradation: growth of the size with the distance from its source; front: further
+    divisor of the sizes at the aggregate, for a sharp front of the substrates; contact: size (um)
+    beside the contact lines with the opposite wall, infinite if there is no limit; film_refinement:
     divisor of the sizes in films, ``refinement`` by default; others: outlines of the other
     aggregates.
     """
@@ -64,11 +64,11 @@ class Sizing:
 
     @property
     def whole_width(self) -> float:
-        """W, or the width with the mirror image beyond a plane of symmetry (um)."""
+        """Width (um) of the pore: W, or 2 W if one wall is a plane of symmetry."""
         return whole_width(self.walls)
 
     def middle(self, outline: Outline) -> np.ndarray | None:
-        """(2,) um, middle of an outline's half-disc at t = 0, None for another shape."""
+        """(2,) um, centre of an aggregate that was a half-disc at t = 0; None for another shape."""
         seat = outline.seat
         if seat.middle is None:
             return None
@@ -76,8 +76,8 @@ class Sizing:
 
     @property
     def moving_lines(self) -> float:
-        """Size (um) beside the contact lines with the opposite wall where a step ends; infinite if
-        they have no size of their own."""
+        """Size (um) beside the contact lines with the opposite wall at the end of a step; infinite
+        if ``contact`` is."""
         return self.contact / PARTS_OF_CONTACT
 
     @property
@@ -88,10 +88,11 @@ class Sizing:
 
 def meshed_extent(outline: Outline | None, width: float, length: float,
                   full: bool = False) -> tuple[float, float]:
-    """Ends (um) of the part to mesh when a mesh is generated (3.1).
+    """x (um) of both ends of a new mesh (3.1).
 
-    min(10 R, 1.5 W) from the aggregate on both sides, never past the pore's ends; a clean channel
-    is meshed over 3 W. width: W, with the mirror image beyond a plane of symmetry (um).
+    A mesh extends min(10 R, 1.5 W) beyond the aggregate on both sides, but not beyond the pore. A
+    clean channel is meshed over 3 W. width: W (um) as :attr:`Sizing.whole_width`; length: of the
+    pore (um); full: mesh the entire pore?
     """
     if full:
         return -length / 2, length / 2
@@ -102,8 +103,7 @@ def meshed_extent(outline: Outline | None, width: float, length: float,
 
 def extent_too_short(outline: Outline, ends: tuple[float, float], width: float,
                      length: float) -> bool:
-    """Is the aggregate closer to an end of the mesh than min(7 R, 1.3 W), with more of the pore
-    beyond (3.1)?"""
+    """Is the aggregate closer than min(7 R, 1.3 W) to an end of the mesh within the pore (3.1)?"""
     reach = min(7 * outline.thickness, 1.3 * width)
     left = outline.upstream - ends[0] < reach and ends[0] > -length / 2
     right = ends[1] - outline.downstream < reach and ends[1] < length / 2
@@ -113,9 +113,9 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float,
 def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) element size (um) at each node of the outline.
 
-    It is the least of several sizes: a tenth of the aggregate's thickness (or the interface's
-    length over ``ALONG_INTERFACE``, if that is larger), a fourteenth of the pore's width, the size
-    for the film at free nodes, and the size beside contact lines with the opposite wall.
+    It is the smallest of these sizes: a tenth of the aggregate's thickness (or the length of the
+    interface over ``ALONG_INTERFACE``, if larger), a fourteenth of the pore's width, the size for
+    the film at free nodes, and the size beside contact lines with the opposite wall.
     """
     length = outline.edge_lengths()[outline.interface_edges()].sum()
     size = max(outline.thickness / ACROSS_AGGREGATE, length / ALONG_INTERFACE)
@@ -126,7 +126,10 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
 
 def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
-    """(M,) size (um) that grows from the contact lines with the opposite wall; inf without them."""
+    """(M,) size (um), growing with the distance from the contact lines with the opposite wall.
+
+    Infinite without these lines.
+    """
     on = touches_wall(outline.wall) & (outline.wall != outline.seat.wall)
     if sizing.contact == inf or not on.any():
         return inf
@@ -143,10 +146,10 @@ def too_coarse(outline: Outline, sizing: Sizing) -> bool:
 
 
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
-    """(M,) element size (um) in the fluid between each node and the walls without contact, and
-    between it and the other aggregates.
+    """(M,) element size (um) of the films between each node and the walls without contact or the
+    other aggregates.
 
-    It is a tenth of the film's thickness over the refinement there, but at least the size in the
+    It is a tenth of the film's thickness over the films' refinement, but at least the size in the
     thinnest resolved film, because thinner films close.
     """
     films = [wall.film(outline.points) for wall in outline.untouched(sizing.walls)]
@@ -162,7 +165,7 @@ def _film_sizes(film: np.ndarray, sizing: Sizing) -> np.ndarray:
 
 
 def each_beside(outlines: Sequence[Outline], sizing: Sizing) -> Iterator[tuple[Outline, Sizing]]:
-    """Each outline, with the element sizes beside the others."""
+    """Each outline with its element sizes, which depend on the corners of the other outlines."""
     for outline in outlines:
         others = tuple(other.corners for other in outlines if other is not outline)
         yield outline, replace(sizing, others=others)
@@ -171,9 +174,9 @@ def each_beside(outlines: Sequence[Outline], sizing: Sizing) -> Iterator[tuple[O
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
     """Points (K, 2) um with prescribed element sizes, and the sizes (K,) um.
 
-    The points are the interface nodes and, across the fluid, points on walls without contact, so
-    that a film has elements of one size. Short interface edges are never merged, so the elements
-    around them are small too.
+    The points are the interface nodes and the opposite points on walls without contact, so that
+    elements have the same size on both sides of a film. Short interface edges are never merged, so
+    the elements around them are small too.
     """
     free = ~touches_wall(outline.wall)
     near = interface_sizes(outline, sizing)[free]
@@ -191,7 +194,7 @@ def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
                 sizing: Sizing) -> np.ndarray:
     """Element size (um) at points (K, 2).
 
-    It grows from the sizes (M,) at the sources (M, 2) up to the largest.
+    It grows from the sizes (M,) at the sources (M, 2), up to the largest size.
     """
     if len(sources) == 0:
         return np.full(len(where), sizing.largest)
@@ -212,7 +215,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     """The same curve with corners spaced by :func:`interface_sizes`.
 
     Interface edges are split into equal parts and never merged, so shape and area stay unchanged.
-    Contact surfaces are straight. They get new nodes, except at their ends and fixed points.
+    Contact surfaces are straight: they keep only their ends and fixed points, and get new nodes.
     """
     polygon = outline.corners
     sizes = interface_sizes(polygon, sizing)
@@ -220,7 +223,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     pieces = []
     for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(polygon.points)
-        if edge_wall[keep[0]] == WELD:  # its nodes are those of the other aggregate
+        if edge_wall[keep[0]] == WELD:  # both aggregates share the nodes of a weld
             halves = np.arange(outline.geometry) / outline.geometry
             pieces.append((np.repeat(keep[:-1], len(halves)), np.tile(halves, len(keep) - 1)))
         elif edge_wall[keep[0]] != FREE:
@@ -242,8 +245,10 @@ def halved(outline: Outline, cut: np.ndarray) -> Outline:
 
 
 def runs(outline: Outline) -> list[tuple[int, int]]:
-    """Pieces (first, last) of the loop of corners: single interface edges, and stretches of wall
-    between their ends, fixed points and corners of the shape at t = 0."""
+    """Pieces (first, last corner) of the loop: single interface edges, and stretches of contact.
+
+    Stretches end at contact lines, fixed points and sharp corners of the shape at t = 0.
+    """
     polygon = outline.corners
     count = len(polygon.points)
     free_edge = polygon.interface_edges()
@@ -253,7 +258,7 @@ def runs(outline: Outline) -> list[tuple[int, int]]:
 
 
 def split_count(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> int:
-    """Number of parts of the edge between the two nodes ``keep``, for sizes (M,) um."""
+    """Number of equal parts of the edge between the two nodes ``keep``, for sizes (M,) um."""
     length = np.linalg.norm(outline.points[keep[1]] - outline.points[keep[0]])
     size = 0.5 * (sizes[keep[0]] + sizes[keep[1]])
     return max(1, int(np.ceil(length / (SPLIT * size))))
@@ -261,8 +266,10 @@ def split_count(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> int:
 
 def _on_the_wall(outline: Outline, keep: np.ndarray, sizes: np.ndarray,
                  sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
-    """Edge, and t on it, of the new nodes along a stretch of wall without its end, graded from the
-    interface."""
+    """Edge and t of each new node along a stretch of contact, without the stretch's last node.
+
+    The nodes are graded from the interface.
+    """
     polygon = outline.corners
     free = polygon.wall == FREE
     ends = polygon.points[keep[[0, -1]]]
@@ -277,8 +284,10 @@ def _on_the_wall(outline: Outline, keep: np.ndarray, sizes: np.ndarray,
 
 
 def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(K,) t in [0, 1] at which arcs along the wall, nodes at (K, 3) um, reach x (K,); the first is
-    zero."""
+    """(K,) t in [0, 1] at which arcs along the wall have the coordinates x (K,); the first is zero.
+
+    nodes: (K, 3) um, x of the arcs' nodes.
+    """
     t = (x - nodes[:, 0]) / (nodes[:, 2] - nodes[:, 0])
     first, second = arc_derivatives(nodes)
     for _ in range(6):
@@ -292,9 +301,9 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
            seed: np.ndarray | None = None) -> Outline:
     """Place nodes (K,), each at t in [0, 1) of an edge; t = 0 is the edge's first corner.
 
-    seed: as :attr:`Sizing.middle`. A new node between two nodes of the seed's arc gets an origin on
-    that arc. A straight edge of the present outline was round at time zero, and the elastic stress
-    makes it round again at the next update.
+    edge: (K,) numbers of edges; seed: as :meth:`Sizing.middle`. If the origins of both ends of a
+    straight edge are on the seed's arc, a new node gets an origin on this arc too. This edge was
+    round at t = 0, and the elastic stress makes it round again at the next update.
     """
     first = t == 0
     corner = outline.geometry * edge
@@ -313,9 +322,10 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
 
 
 def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Move points (K, 2), each between two others, to the arc around the origin through these.
+    """Move each of points (K, 2) to the arc around (0, 0) through its neighbours.
 
-    A point does not move if it is on the wall, or if no arc passes through the other two.
+    first, second: (K, 2) neighbours. A point does not move if it is on the wall, or if its
+    neighbours have different distances from (0, 0).
     """
     radius = np.hypot(*first.T)
     distance = np.hypot(*places.T)

@@ -59,7 +59,7 @@ class Space:
 
     @property
     def points(self) -> np.ndarray:
-        """(count, 2) um, places of the nodes."""
+        """(count, 2) um, coordinates of the nodes."""
         return self.mesh.points
 
     @property
@@ -79,7 +79,7 @@ class Space:
 
     @property
     def gradient_degree(self) -> int:
-        """Degree of the quadrature of gradients; it has one point on straight linear triangles."""
+        """Degree of the quadrature for gradients; straight triangles need one point."""
         return elements.ELEMENTS[self.order].gradient_degree
 
     @cached_property
@@ -109,11 +109,11 @@ class Space:
 
     @cached_property
     def reaction(self) -> Basis:
-        """The functions at the points of the biomass at which uptake and growth are integrated."""
+        """The functions at the points in the biomass where uptake and growth are integrated."""
         return self.integration.reaction()
 
     def lumped(self, where: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(corners,) um2, a third of the area of the triangles ``where`` around each corner."""
+        """(corners,) um2: each corner has a third of the area of its triangles in ``where``."""
         of = elements.vertex_table(self.order)
         dx = elements.weights(self.mesh.points[self.mesh.cells[where]], of)
         return np.bincount(self.mesh.triangles[where].ravel(), dx.ravel(), self.mesh.corners)
@@ -138,8 +138,9 @@ class Space:
 class End:
     """Functions along an end of the mesh, and its forms <., v>.
 
-    edges: (E, e) nodes of each edge, from the lower wall up, of ``count`` in all; lengths: (E,) um;
-    values: (p, e) of an edge's functions at its quadrature points, with weights (p,).
+    edges: (E, e) nodes of each edge, from the lower wall up; count: number of nodes of the mesh;
+    lengths: (E,) um; values: (p, e) of an edge's functions at its quadrature points; weights: (p,)
+    of these points.
     """
 
     edges: np.ndarray
@@ -177,7 +178,7 @@ class End:
 
 @dataclass(frozen=True, eq=False)
 class Lumped:
-    """Integrals at the nodes, as in the paper: a node has a third of the area of its triangles."""
+    """Integration at the nodes, as in the paper. A node has a third of its triangles' area."""
 
     space: Space
 
@@ -193,7 +194,7 @@ class Lumped:
         return each(self.space.mesh.areas / 3, np.eye(3)[None])
 
     def to_nodes(self, field: np.ndarray) -> np.ndarray:
-        """(N,) values at the mesh's nodes, from a field (r, 1) at the points; zero in the fluid."""
+        """(N,) values at the mesh's nodes, from values (r, 1) at the points; zero in the fluid."""
         mesh = self.space.mesh
         nodal = np.zeros(mesh.corners)
         nodal[mesh.topology.body_corners] = field[:, 0]
@@ -204,7 +205,7 @@ class Lumped:
         return nodal[self.space.reaction.cells]
 
     def rows(self, region: Region) -> np.ndarray:
-        """Return the (r,) points of one aggregate among those of all."""
+        """Return the indices (r,) of one aggregate's points among the points of all aggregates."""
         return np.searchsorted(self.space.mesh.topology.body_corners, region.corner_nodes)
 
     def to_growth_points(self, region: Region, field: np.ndarray) -> np.ndarray:
@@ -228,7 +229,7 @@ class Lumped:
 
 @dataclass(frozen=True, eq=False)
 class Quadrature:
-    """Integrals at the quadrature points for products."""
+    """Integration at the quadrature points for products."""
 
     space: Space
 
@@ -243,9 +244,9 @@ class Quadrature:
         return self.space.at.mass(self.space.at.dx)
 
     def to_nodes(self, field: np.ndarray) -> np.ndarray:
-        """(N,) values at the mesh's nodes, from a field (r, q) at the points; zero in the fluid.
+        """(N,) values at the mesh's nodes, from values (r, q) at the points; zero in the fluid.
 
-        A linear function is fitted to the points of each triangle, and a node has the mean over its
+        A linear function is fitted to the points of each triangle. A node gets the mean over its
         triangles.
         """
         mesh = self.space.mesh
@@ -263,7 +264,7 @@ class Quadrature:
         return nodal[mesh.cells[mesh.biomass]] @ self.space.table.values.T
 
     def rows(self, region: Region) -> np.ndarray:
-        """Return the (r,) triangles of one aggregate among those of all."""
+        """Return the indices (r,) of one aggregate's triangles among those of all aggregates."""
         return np.searchsorted(np.flatnonzero(self.space.mesh.biomass), region.triangles)
 
     def to_growth_points(self, region: Region, field: np.ndarray) -> np.ndarray:
@@ -279,10 +280,10 @@ class Quadrature:
         return after / before
 
     def finer(self, degrees: int) -> tuple[Basis, np.ndarray]:
-        """Return the functions in the biomass at points of a more exact quadrature.
+        """Return the functions in the biomass at the p points of a more exact quadrature.
 
-        Its degree is larger by ``degrees``. The matrix (q, p) takes a density there, linear in each
-        triangle.
+        Its degree is larger by ``degrees``. Also returns a matrix (q, p): it maps a density at the
+        present points to a linear fit in each triangle, at the new points.
         """
         space = self.space
         mesh = space.mesh

@@ -1,14 +1,13 @@
 """Transfer of fields from one mesh to another (3.5, [E8]).
 
-Interpolation evaluates a field of any order at points in the old triangles, straight or curved. It
-is the paper's transfer, and drifts. The conserving transfer of linear fields is the Galerkin
-projection
+Interpolation evaluates a field of any order at points in the old triangles, straight or curved. The
+paper uses it; the total drifts. The conserving transfer of linear fields is the Galerkin projection
 
     (X_new, N_i) = (X_old, N_i)  for every new N_i,
 
-integrated exactly over the common pieces of both meshes. If both meshes cover the same polygon,
-it keeps the total, constants and linear fields to round-off. It may overshoot where a field is
-steep.
+integrated exactly over the common pieces of both meshes. If both meshes cover the same polygon, the
+projection keeps the total, constants and linear fields to round-off. It may overshoot where a field
+is steep.
 """
 
 from __future__ import annotations
@@ -29,22 +28,26 @@ from repro.timing import timed
 COVER = 1e-9
 #: Largest number of Newton steps that locate a point in a curved triangle.
 NEWTON_STEPS = 12
-#: Length of the last step on the unit triangle; the error after it is the square of this.
+#: Newton's method stops after a step shorter than this on the unit triangle. The error is then of
+#: the order of its square.
 CLOSE = 1e-8
-#: A triangle's map to t = 0 counts as folded where its determinant is below this part of the
-#: triangle's largest determinant.
+#: The map of a triangle to t = 0 counts as folded if its least determinant is below this part of
+#: its largest one.
 FOLD = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Points in old triangles. triangle: (K,) numbers; local: (K, 2) on the unit triangle."""
+    """Points located in old triangles.
+
+    triangle: (K,) number of the triangle; local: (K, 2) coordinates on its unit triangle.
+    """
 
     triangle: np.ndarray
     local: np.ndarray
 
     def field(self, values: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """(K, ...) field at these points, from values (N, ...) at the nodes (T, k) of triangles."""
+        """(K, ...) field at these points, from values (N, ...) at the nodes of ``cells`` (T, k)."""
         weights = elements.values(elements.order_of(cells), self.local)
         return np.einsum("ka,ka...->k...", weights, values[cells[self.triangle]])
 
@@ -54,9 +57,9 @@ class Located:
 def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
     """Locate points (K, 2) um in triangles (T, 3 or 6).
 
-    Newton's method solves x(s, t) in every triangle whose box contains the point, and the triangle
-    in which the point lies deepest is chosen. A point slightly outside moves to the edge of the
-    nearest triangle. Raises TransferError if a point is far from all triangles.
+    Newton's method inverts x(s, t) in every triangle whose box contains the point. The triangle in
+    which the point lies deepest is chosen. A point slightly outside all triangles moves to the edge
+    of the nearest one. Raises TransferError if a point is far from all triangles.
     """
     nodes = points[cells]
     size = np.ptp(nodes, axis=1).max(axis=1)
@@ -74,9 +77,9 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
 
 
 def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray:
-    """(K, 2) on the unit triangle of points (K, 2) in triangles (K, g, 2).
+    """(K, 2) coordinates on the unit triangle of points (K, 2) um in triangles (K, g, 2) um.
 
-    Where Newton's method does not converge, the result is far outside.
+    Where Newton's method does not converge, the result is far outside the unit triangle.
     """
     if geometry == 1:
         return barycentric(nodes, where)[:, 1:]
@@ -103,7 +106,7 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
 
 
 def _inside(local: np.ndarray) -> np.ndarray:
-    """Points on the unit triangle; those outside move to its edge."""
+    """Points (K, 2) on the unit triangle; points outside move to its edge."""
     L = np.clip(elements.values(1, local), 0.0, None)
     s, t = (L / L.sum(axis=1, keepdims=True))[:, 1:].T
     return np.column_stack([s, np.minimum(t, 1 - s)])  # 1 - s - t is not negative to the last bit
@@ -132,16 +135,20 @@ def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray,
 
 def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
                  new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
-    """(K, m) linear fields (N, m) at the nodes of another mesh; arguments of :func:`project`."""
+    """(K, m) values of linear fields (N, m) at the nodes of another mesh.
+
+    Arguments are those of :func:`project`.
+    """
     return interpolate(points, triangles, fields, new_points)
 
 
 def unfolded(mesh: Mesh, origin: np.ndarray, region: Region) -> np.ndarray:
-    """Coordinates at t = 0 (N, 2) um for which no triangle of an aggregate is turned over.
+    """Coordinates (N, 2) um of the nodes at t = 0, corrected so that no triangle of an aggregate is
+    turned over.
 
-    In a triangle that is turned over, middles move half way between their corners. Its neighbours
-    have the same middles, so they are tested again. Raises OriginFolded if a triangle with straight
-    edges is turned over.
+    If a triangle is turned over, its middles move half way between its corners. Neighbours share
+    these middles, so they are tested again. Raises OriginFolded if a triangle with straight edges
+    is turned over.
     """
     cells = region.cells
     derivatives = checked_map_derivatives(mesh.geometry)
@@ -162,8 +169,8 @@ def unfolded(mesh: Mesh, origin: np.ndarray, region: Region) -> np.ndarray:
 
 def supermesh(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
               new_triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Common pieces of two meshes: corners (p, 3, 2), and the old and the new triangle (p,) around
-    each piece."""
+    """Common pieces of two meshes: corners (p, 3, 2), and numbers (p,) of the old and the new
+    triangle that contain each piece."""
     boxes = shapely.STRtree(shapely.polygons(points[triangles]))
     new, old = boxes.query(shapely.polygons(new_points[new_triangles]))
     pieces = clip(points[triangles[old]], new_points[new_triangles[new]])
@@ -176,12 +183,12 @@ def supermesh(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
 
 
 def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
-    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair.
+    """Intersect convex polygons (p, k, 2) with counterclockwise triangles (p, 3, 2), pair by pair.
 
-    Returns (p, m, 2): polygons with fewer than m corners repeat one of them, empty ones are a
-    single point. m is from 3 to k + 3, or larger where round-off makes corners on a line of the
-    window change sides more than twice. Sutherland and Hodgman's algorithm: each side of the
-    window in turn cuts off the part on its right.
+    Returns (p, m, 2): polygons with fewer than m corners repeat a corner, and empty polygons repeat
+    a point. m is from 3 to k + 3; it is larger if round-off makes corners on a line of the window
+    change sides more than twice. Sutherland and Hodgman's algorithm: each side of the window in
+    turn cuts off what lies on its right.
     """
     for side in range(3):
         start = windows[:, side, None]
@@ -200,7 +207,7 @@ def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
 
 
 def _packed(points: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """(p, room, 2) points (p, k, 2) selected by ``mask``, in order, padded with the first one."""
+    """(p, room, 2) points (p, k, 2) that ``mask`` (p, k) selects, padded with the first of them."""
     count = mask.sum(axis=1)[:, None]
     room = max(3, int(count.max(initial=0)))
     front = np.argsort(~mask, axis=1, kind="stable")[:, :room]
@@ -221,8 +228,11 @@ def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Common pieces of two meshes. corners: (p, 3, 2) um; old, new: (p,) triangles that
-    contain them; area: (p,) um2."""
+    """Common pieces of two meshes.
+
+    corners: (p, 3, 2) um; old, new: (p,) numbers of the triangles that contain each piece; area:
+    (p,) um2.
+    """
 
     corners: np.ndarray
     old: np.ndarray
@@ -246,7 +256,7 @@ def _pieces(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
 
 def _loads(pieces: Pieces, points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
            new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
-    """(K, m) integrals of the old fields times each new nodal function."""
+    """(K, m) integrals of the old fields (N, m) times each new nodal function."""
     old = triangles[pieces.old]
     new = new_triangles[pieces.new]
     middles = 0.5 * (pieces.corners + np.roll(pieces.corners, -1, axis=1))
@@ -260,8 +270,10 @@ def _loads(pieces: Pieces, points: np.ndarray, triangles: np.ndarray, fields: np
 
 
 def _solve_mass(points: np.ndarray, triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """(K, m) solutions with the mass matrix of the linear nodal functions, one for each column of
-    the right side. Every node must belong to a triangle."""
+    """(K, m) solutions with the mass matrix of linear functions, for right sides (K, m).
+
+    Every node must belong to a triangle.
+    """
     rank = np.argsort(linear.node_order(len(points), triangles))
     system = ElementSystem(triangles, rank, np.zeros(len(points), bool))
     solver = linear.Solver(system.matrix(mass(triangle_areas(points, triangles))))

@@ -1,15 +1,16 @@
-"""The walls of the pore (2.1), as data: where they are, and what they do.
+"""The walls of the pore (2.1): their positions and their boundary conditions, as data.
 
-A stage asks a wall; no stage knows which one it is. The channel is 0 <= y <= W, and a pore has a
-list of two walls. An aggregate sees them from its seat: first the wall of its seed, then the
-opposite one. Nodes and contact lines name their wall by its number; FREE is no wall.
+The channel is 0 <= y <= W, and a pore has a list of two walls. A stage reads the conditions from a
+wall and does not distinguish walls otherwise. Each aggregate has its own order of the walls: first
+the wall of its seed, then the opposite wall. Nodes and contact lines refer to a wall by its number;
+FREE means no wall.
 
 No substrate flows through a wall. This is the natural condition of the weak form (11)-(12), so the
-transport asks nothing.
+transport needs no data of the walls.
 
-A plane of symmetry is the middle of a pore of twice the width. Its mirror image lies beyond it. The
-water slips along the plane, biomass slides along it without a fixed point, and a film that ends
-there is half of the film between the aggregate and its mirror image.
+A plane of symmetry is the middle plane of a pore of twice the width. The mirror image of the
+channel lies beyond it. The water slips along the plane, and biomass slides along it without a fixed
+point. A film at the plane is half of the film between the aggregate and its mirror image.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 FREE = 0
 BOTTOM = 1
 TOP = 2
-#: Number of no wall: the surface of another aggregate, to which an aggregate is welded.
+#: Number for the surface of another aggregate, to which an aggregate is welded. It is not a wall.
 WELD = 3
 
 
@@ -31,13 +32,13 @@ WELD = 3
 class Wall:
     """A straight wall along the pore.
 
-    number: of the wall; y: its place (um); normal: y component of its unit normal into the pore, 1
-    or -1. An aggregate's boundary runs counterclockwise, so along a wall it runs in the direction
-    of x if the normal is 1, else against it.
+    number: of the wall; y: its coordinate (um); normal: y component of its unit normal into the
+    pore, 1 or -1. An aggregate's boundary runs counterclockwise. Along a wall it therefore runs in
+    the direction of x if the normal is 1, and against it if the normal is -1.
 
-    no_slip: is the velocity along the wall zero, too (5)? bonded: does an aggregate whose seed sat
-    on the wall keep its place there, or slide along it (2.3.3)? keeps_point: does the middle of a
-    new contact surface keep its x (2.3.3)? mirrors: is it a plane of symmetry?
+    no_slip: is the tangential velocity zero too (5)? bonded: is an aggregate fixed to the wall of
+    its seed? It slides otherwise (2.3.3). keeps_point: does the middle of a new contact surface
+    keep its x (2.3.3)? mirrors: is the wall a plane of symmetry?
     """
 
     number: int
@@ -50,7 +51,7 @@ class Wall:
 
     @property
     def part(self) -> float:
-        """The part of a film or a channel on this side of the wall: half at a plane of symmetry."""
+        """Fraction of a film or a channel on this side of the wall: 1/2 at a plane of symmetry."""
         return 0.5 if self.mirrors else 1.0
 
     def gap(self, points: np.ndarray) -> np.ndarray:
@@ -58,8 +59,8 @@ class Wall:
         return self.normal * (points[..., 1] - self.y)
 
     def film(self, points: np.ndarray) -> np.ndarray:
-        """(...,) um, thickness of a film between points (..., 2) and the wall, or between them and
-        their mirror images."""
+        """(...,) um, thickness of the film between points (..., 2) and the wall; at a plane of
+        symmetry, between the points and their mirror images."""
         return self.gap(points) / self.part
 
     def holds(self, points: np.ndarray) -> np.ndarray:
@@ -67,28 +68,27 @@ class Wall:
         return points[..., 1] == self.y
 
 
-#: The walls of a pore, or those that an aggregate sees: first that of its seed.
+#: The two walls of a pore. In the order of an aggregate, the wall of its seed comes first.
 Walls: TypeAlias = tuple[Wall, ...]
 
 
 @dataclass(frozen=True)
 class Seat:
-    """Where the seed of an aggregate sat.
+    """Position of an aggregate's seed.
 
-    wall: number of its wall; middle: x (um) of the middle of the half-disc, None for another shape.
+    wall: number of its wall; middle: x (um) of a half-disc's centre, None for another shape.
     """
 
     wall: int = BOTTOM
     middle: float | None = None
 
     def walls(self, walls: Walls) -> Walls:
-        """The walls that the aggregate sees: its own one, then the opposite one, along which it
-        slides."""
+        """The wall of the seed, then the opposite wall. The aggregate slides along the latter."""
         own = numbered(walls, self.wall)
         return own, *(replace(wall, bonded=False) for wall in walls if wall != own)
 
 
-#: What a wall does, by its word in a scene.
+#: {condition in a scene: attributes of the wall}.
 CONDITIONS: dict[str, dict[str, bool]] = {
     "no slip": {},
     "symmetry": {"no_slip": False, "keeps_point": False, "mirrors": True}}
@@ -97,16 +97,15 @@ CONDITIONS: dict[str, dict[str, bool]] = {
 def channel_walls(width: float, bonded: bool = False, upper: str = "no slip") -> Walls:
     """The walls of the channel 0 <= y <= ``width`` (um).
 
-    bonded: each aggregate to the wall of its seed? upper: condition on the upper one, of
-    ``CONDITIONS``.
+    bonded: is each aggregate bonded to the wall of its seed? upper: condition on the upper wall, a
+    key of ``CONDITIONS``.
     """
     return (Wall(BOTTOM, 0.0, 1.0, bonded=bonded),
             Wall(TOP, width, -1.0, **{"bonded": bonded, **CONDITIONS[upper]}))
 
 
 def touches_wall(numbers: np.ndarray) -> np.ndarray:
-    """True where a node touches a wall, from the numbers in its outline: it is neither free nor
-    welded."""
+    """(M,) True where a node touches a wall, from :attr:`Outline.wall`: not free and not welded."""
     return (numbers != FREE) & (numbers != WELD)
 
 
@@ -122,8 +121,7 @@ def width_between(walls: Walls) -> float:
 
 
 def whole_width(walls: Walls) -> float:
-    """Width (um) of the pore. With a plane of symmetry it is that of the pore and its mirror image.
-    """
+    """Width (um) of the pore: W, or 2 W if one wall is a plane of symmetry."""
     width = width_between(walls)
     for wall in walls:
         width /= wall.part
@@ -136,7 +134,7 @@ def on_any(walls: Iterable[Wall], points: np.ndarray) -> np.ndarray:
 
 
 def numbers_at(walls: Iterable[Wall], points: np.ndarray) -> np.ndarray:
-    """(M,) number of the wall on which each of points (M, 2) lies, FREE on none."""
+    """(M,) number of the wall on which each of points (M, 2) lies; FREE if it lies on none."""
     numbers = np.full(len(points), FREE)
     for wall in walls:
         numbers[wall.holds(points)] = wall.number

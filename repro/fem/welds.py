@@ -1,10 +1,11 @@
-"""Aggregates that are welded to each other: their boundaries share the nodes of the weld.
+"""Welded aggregates: their boundaries share the nodes of the weld.
 
-Nodes of a weld have the number WELD in the contact of both outlines, and the same places to the
-last bit. Each outline keeps its own places at t = 0. Beyond an end of the weld the free surfaces of
-both aggregates form a notch. Its corners are opposite each other: the k-th corner of one surface
-from the line belongs to the k-th of the other one, at about the same length along its surface. A
-new mesh gives both surfaces these corners (:func:`matched`), so that the weld can advance by nodes.
+Nodes of a weld have the number WELD in both outlines, and the same coordinates to the last bit.
+Each outline keeps its own coordinates at t = 0. An end of the weld is a line where the free
+surfaces of both aggregates meet and form a notch. The corners of the two surfaces are opposite: the
+k-th corner from the line on one surface is at about the same arc length as the k-th corner on the
+other surface. A new mesh gives both surfaces these corners (:func:`matched`), so that the weld can
+advance by nodes.
 """
 
 from __future__ import annotations
@@ -20,27 +21,27 @@ from repro.fem.outline import ON_ARC, Outline, parabola
 from repro.fem.sizing import Sizing, placed
 from repro.fem.walls import FREE, WELD
 
-#: Corners of the two surfaces are opposite if their lengths from the line differ by at most this
-#: part of the shortest edge beside them. Below a half, no corner has two opposite ones.
+#: Corners of the two surfaces are opposite if their arc lengths from the line differ by at most
+#: this part of the shortest edge beside them. Below 1/2, no corner has two opposite corners.
 OPPOSITE = 0.3
-#: Corners that a new mesh has made opposite count as such up to this part, because their lengths
-#: change with growth.
+#: The same part for corners that a new mesh has made opposite. It is larger because their arc
+#: lengths change with growth.
 STILL_OPPOSITE = 0.6
-#: The surfaces have opposite corners where the film between them is thinner than this, over the
-#: least film.
+#: A new mesh makes corners opposite where the film is thinner than this times the least film.
 MATCHED_FILMS = 3.0
-#: Size beside the line, at least, over the least film: ``exact`` has no equilibrium with an
-#: eightieth.
+#: Least element size beside the line, over the least film. With 1/80, ``exact`` finds no
+#: equilibrium.
 FINEST = 0.125
-#: A point nearer to a corner than this part of an arc is that corner.
+#: A point counts as the corner if its distance from it is less than this part of the arc.
 AT_CORNER = 0.05
-#: Rounds that find the nearest points of two outlines, each on intervals a quarter as long.
+#: Rounds of the search for the nearest points of two outlines. Each round divides the interval by
+#: four.
 ROUNDS = 12
 
 
 def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """(K, 2) um, the points of all outlines, those of a weld once, and the numbers (M,) of each
-    outline's points among them."""
+    """(K, 2) um, the points of all outlines, with the points of a weld once; and for each outline,
+    (M,) indices of its points."""
     numbers: dict[tuple[float, ...], int] = {}
     own = [np.array([numbers.setdefault(tuple(point), len(numbers))
                      for point in outline.points.tolist()]) for outline in outlines]
@@ -49,16 +50,18 @@ def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndar
 
 def united(outlines: Sequence[Outline],
            own: Sequence[np.ndarray]) -> tuple[list[Outline], list[np.ndarray]]:
-    """The outlines with one in place of two that are welded: that around both. own: as
-    :func:`shared_points` gives it. Raises MeshError if two aggregates share more than one chain of
-    nodes."""
+    """Replace two welded outlines by the outline around both; others stay unchanged.
+
+    own: as :func:`shared_points` returns it. Returns the outlines, and ``own`` for them. Raises
+    MeshError if two aggregates share more than one chain of nodes.
+    """
     if len(outlines) != 2 or not np.isin(own[0], own[1]).any():
         return list(outlines), list(own)
     first, second = outlines
     weld = np.isin(own[0], own[1])
     starts = np.flatnonzero(weld & ~np.roll(weld, 1))
     if len(starts) != 1:
-        raise MeshError("two aggregates touch in two places; they may join in one")
+        raise MeshError("two aggregates touch at several places; a weld joins them at one place")
     size = int(weld.sum())
     around = (starts[0] + size - 1 + np.arange(len(weld) - size + 2)) % len(weld)
     of_second = np.isin(own[1], own[0])
@@ -82,8 +85,10 @@ def ends_of(outline: Outline) -> tuple[int, int]:
 
 
 def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For both ends of a weld, the nodes (k,) of either outline from the line on, as far as both
-    are free; the line comes first."""
+    """For both ends of a weld, the free nodes (k,) of either outline beyond the line.
+
+    The node of the line comes first.
+    """
     start, end = ends_of(first)
     begin, last = ends_of(second)
     return [(_free_from(first, end, 1), _free_from(second, begin, -1)),
@@ -91,7 +96,7 @@ def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarra
 
 
 def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
-    """Nodes from one on, in a direction along the loop, as far as they are free, to a corner."""
+    """The node, and the free nodes after it in a direction along the loop, up to a corner."""
     count = len(outline.points)
     walk = (node + direction * np.arange(count)) % count
     free = 1 + int(np.flatnonzero(outline.wall[walk[1:]] != FREE)[0])
@@ -99,13 +104,13 @@ def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
 
 
 def lengths_from(outline: Outline, walk: np.ndarray) -> np.ndarray:
-    """(c,) um along the surface from the first of the nodes ``walk`` to each of its corners."""
+    """(c,) um, arc length from the first of the consecutive nodes ``walk`` to each corner."""
     return _lengths(outline, walk)[::ON_ARC]
 
 
 def _lengths(outline: Outline, walk: np.ndarray) -> np.ndarray:
-    """(p,) um along the surface from the first of the nodes ``walk`` to points on its arcs: to
-    ON_ARC of each, the last of them its end."""
+    """(p,) um, arc length from the first of the consecutive nodes ``walk`` to ON_ARC points on each
+    arc. The last of these points is the arc's end."""
     nodes = outline.points[walk]
     arcs = np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1)
     points = np.einsum("ta,kai->kti", parabola(np.linspace(0, 1, ON_ARC + 1)), arcs)
@@ -114,9 +119,9 @@ def _lengths(outline: Outline, walk: np.ndarray) -> np.ndarray:
 
 
 def opposite(one: np.ndarray, other: np.ndarray, part: float = OPPOSITE) -> np.ndarray:
-    """(c, d) True where a corner at a length (c,) um from the line is opposite one at (d,) um.
+    """(c, d) True where a corner of one surface is opposite a corner of the other surface.
 
-    part: like OPPOSITE.
+    one, other: (c,) and (d,) um, arc lengths of the corners from the line; part: like OPPOSITE.
     """
     apart = np.abs(one[:, None] - other)
     return apart <= part * np.minimum(_shortest(one)[:, None], _shortest(other))
@@ -129,14 +134,14 @@ def _shortest(lengths: np.ndarray) -> np.ndarray:
 
 
 def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
-    """The same curves with opposite corners beyond a weld, close to each other at its ends."""
+    """The same curves with opposite corners beyond a weld, and short edges at its ends."""
     if len(outlines) != 2 or not all((outline.wall == WELD).any() for outline in outlines):
         return list(outlines)
     return _with_opposite(_refined(outlines, sizing), sizing.film)
 
 
 def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
-    """The same curves with opposite corners beyond a weld; film: the least one, um."""
+    """The same curves with opposite corners beyond a weld; film: the least film, um."""
     cuts: tuple[list, list] = ([], [])
     for walks in notches(*outlines):
         lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
@@ -152,8 +157,8 @@ def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
 def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """The same curves with the edges beyond a weld divided into equal parts.
 
-    The parts are at most as long as ``sizing.moving_lines``, or FINEST, over the least film from
-    the line, and grow from there.
+    Up to the length of the least film from the line, parts are at most ``sizing.moving_lines`` long
+    (or FINEST times the least film, if larger). From there on they grow.
     """
     cuts: tuple[list, list] = ([], [])
     line = max(sizing.moving_lines, FINEST * sizing.film)
@@ -169,8 +174,10 @@ def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
 
 
 def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
-    """Number of corners from the line on, the line included, that are opposite each other, from the
-    lengths (um) at which they lie on both surfaces."""
+    """Number of consecutive pairs of opposite corners; the line is the first pair.
+
+    one, two: (c,) and (d,) um, arc lengths of the corners of both surfaces from the line.
+    """
     count = min(len(one), len(two))
     pairs = np.diagonal(opposite(one, two, STILL_OPPOSITE))[:count]
     return count if pairs.all() else int(np.argmin(pairs))
@@ -178,7 +185,7 @@ def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
 
 def _reach(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
            lengths: Sequence[np.ndarray], thick: float) -> float:
-    """Length (um) from the line at which the film is thicker than ``thick`` (um)."""
+    """Arc length (um) from the line at which the film becomes thicker than ``thick`` (um)."""
     one, two = (outline.points[walk[:: outline.geometry]]
                 for outline, walk in zip(outlines, walks))
     beside = np.column_stack([np.interp(lengths[0], lengths[1], two[:, axis]) for axis in (0, 1)])
@@ -188,7 +195,7 @@ def _reach(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
 
 
 def _places(outline: Outline, walk: np.ndarray, s: np.ndarray) -> list[tuple[int, float]]:
-    """(arc, t) of the points at lengths s (um) from the first of the nodes ``walk``."""
+    """(arc, t) of the points at arc lengths s (k,) um from the first of the nodes ``walk``."""
     lengths = _lengths(outline, walk)
     corners = walk[::2] // 2
     arcs = len(outline.points) // 2
@@ -200,7 +207,7 @@ def _places(outline: Outline, walk: np.ndarray, s: np.ndarray) -> list[tuple[int
 
 
 def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
-    """The same curve with further corners at t in (0, 1) of edges."""
+    """The same curve with further corners; places: (edge, t) with t in (0, 1)."""
     if not places:
         return outline
     edges = len(outline.points) // outline.geometry
@@ -215,8 +222,8 @@ def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
 
 
 def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
-    """The same curves with a corner of each at the point nearest to the other, marked as a weld,
-    and corners at the length ``reach`` (um) on both sides of it."""
+    """The same curves with new corners: one at the point nearest to the other curve, marked as a
+    weld, and one at the arc length ``reach`` (um) on each side of it."""
     outlines = []
     for outline, (edge, t) in zip((first, second), _nearest(first, second)):
         edges = len(outline.points) // outline.geometry
@@ -234,7 +241,7 @@ def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
 
 
 def _nearest(first: Outline, second: Outline) -> list[tuple[int, float]]:
-    """(edge, t) of the nearest points of two outlines."""
+    """(edge, t) of the point of each outline that is nearest to the other one."""
     arcs = [outline.arcs(outline.points) for outline in (first, second)]
     t = np.linspace(0, 1, 17)
     one, two = (np.einsum("ta,kai->kti", parabola(t), each).reshape(-1, 2) for each in arcs)

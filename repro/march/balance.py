@@ -1,8 +1,8 @@
 """Mass balances of a step, their defects, and the check that ends a run.
 
-Defects are relative. A positive defect means that too much was supplied or made. If the amounts
-are of the size of round-off, the defect is relative to a floor: round-off divided by LARGEST.
-Except for the options that :func:`refuse` lists, a step closes to round-off. A larger defect is an
+Defects are relative. A positive defect means that too much was supplied or made. If all amounts are
+as small as round-off, the defect is relative to a floor: round-off divided by LARGEST. A step
+balances to round-off, except with the options that :func:`refuse` lists. A larger defect is an
 error of the code or of its use.
 """
 
@@ -26,18 +26,19 @@ if TYPE_CHECKING:
 #: Largest accepted defect.
 LARGEST = 1e-6
 #: Bound of the round-off in the difference of two masses, relative to a mass. Pairwise summation in
-#: blocks of 128 in 8 lanes errs by (16 + log2(n / 128)) eps at most, less than 40 eps for any mesh;
-#: a difference has two sums of X_A and two of X_I, and so errs by up to 4e-14.
+#: blocks of 128 in 8 lanes errs by at most (16 + log2(n / 128)) eps, less than 40 eps for any mesh.
+#: A difference has two sums of X_A and two of X_I, so it errs by up to 4e-14.
 ROUND_OFF = 1e-13
 
 
 @dataclass(frozen=True)
 class Ledger:
-    """Mass balance of one step per unit depth (um2 mg/L = 1e-12 g/m): substrates, then biomass,
-    then the unmet demand of both substrates (:mod:`repro.model.kinetics`).
+    """Mass balance of one step, per unit depth (um2 mg/L = 1e-12 g/m).
 
-    detached: biomass that erosion has removed in the step, and that of the aggregates that have
-    left the pore at its end.
+    start, end: times (h); supplied, out, consumed, stored, unmet: of acceptor and donor, where
+    unmet is the demand that no modelled substrate meets (:mod:`repro.model.kinetics`); detached:
+    biomass that erosion has removed in the step, plus the biomass of aggregates that have left the
+    pore at its end.
     """
 
     start: float
@@ -55,9 +56,9 @@ class Ledger:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Data of a scene that set the accepted defects of a run.
+    """Data of a scene from which the accepted defects of a run follow.
 
-    width: um, of the pore; substrates: with their largest supplies.
+    width: um, of the pore; substrates: with the largest supply of each over time.
     """
 
     width: float
@@ -76,7 +77,10 @@ class Limits:
 
 def defect(supplied: float, out: float, consumed: float, stored: float = 0.0,
            room: float = 0.0) -> float:
-    """(supplied - out - consumed - stored) / max(abs(supplied), consumed, room), or zero."""
+    """(supplied - out - consumed - stored) / max(abs(supplied), consumed, room).
+
+    Zero if the divisor is zero.
+    """
     scale = max(abs(supplied), consumed, room)
     return (supplied - out - consumed - stored) / scale if scale else 0.0
 
@@ -84,8 +88,8 @@ def defect(supplied: float, out: float, consumed: float, stored: float = 0.0,
 def floor(problem: Problem, k: int, supply: float) -> float:
     """Round-off in the flux (um2 mg/L/h) of the acceptor (k = 0) or the donor (1), over LARGEST.
 
-    Round-off is eps times the sum of the magnitudes of all terms of its equations at a supply
-    (mg/L).
+    Round-off is eps times the sum of the magnitudes of all terms of the substrate's equations if
+    its concentration is ``supply`` (mg/L) everywhere.
     """
     n = problem.space.count
     k -= problem.substrates.places.start
@@ -99,16 +103,20 @@ def substrate(ledger: Ledger, k: int, room: float = 0.0) -> float:
 
 
 def biomass(ledger: Ledger) -> float:
-    """Relative defect of the biomass: (after - before - made) / after, where after includes what
-    has left; zero in a clean channel."""
+    """Relative defect of the biomass: (after - before - made) / after; zero in a clean channel.
+
+    ``after`` includes the detached biomass.
+    """
     after = ledger.biomass_after + ledger.detached
     missing = after - ledger.biomass_before - ledger.biomass_made
     return missing / after if after else missing
 
 
 def demand_terms(kinetics: Kinetics, ledger: Ledger) -> tuple[float, float]:
-    """Biomass grown and decayed, um2 mg/L, from the consumed substrates and the unmet demand
-    (7)-(10): Y donor, and (acceptor - F donor) / d_c."""
+    """Biomass grown, Y donor, and decayed, (acceptor - F donor) / d_c, um2 mg/L (7)-(10).
+
+    acceptor, donor: the consumed amount plus the unmet demand.
+    """
     acceptor, donor = (used + unmet for used, unmet in zip(ledger.consumed, ledger.unmet))
     return (kinetics.yield_coefficient * donor,
             (acceptor - kinetics.acceptor_to_donor_ratio * donor) / kinetics.decay_oxygen_demand)
@@ -132,9 +140,9 @@ def oxygen_demand(kinetics: Kinetics, ledger: Ledger) -> float:
 def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
     """Raise BalanceError if a defect of the step that ends in ``after`` is larger than LARGEST.
 
-    Some schemes have known defects, which are reported and not refused: the substrates with the
-    printed inlet [E4] or carrier, and the biomass with interpolation [E8]. The oxygen demand has
-    the limit of :func:`accepted_demand`.
+    Known defects of some schemes are reported but not refused: the substrates with the printed
+    inlet [E4] or the printed carrier, and the biomass with interpolation [E8]. The limit for the
+    oxygen demand is :func:`accepted_demand`.
     """
     defects = {}
     if limits.scheme.conserves_substrates:
@@ -157,8 +165,8 @@ def refuse(limits: Limits, after: Pore, ledger: Ledger) -> None:
 def accepted_demand(limits: Limits, ledger: Ledger) -> float:
     """Largest accepted defect of the oxygen demand in a step.
 
-    The midpoint rule closes to round-off. In the paper's updates the method of transport bounds the
-    error. The bound depends on dt times the fastest rate, k Y + b.
+    The midpoint rule balances to round-off. In the paper's updates the error has a bound, which
+    depends on the method of transport and on dt times the fastest rate, k Y + b.
     """
     if limits.scheme.controls_error or not ledger.biomass_before:
         return LARGEST
@@ -177,7 +185,8 @@ def accepted_demand(limits: Limits, ledger: Ledger) -> float:
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
-    """Turnover in a step (um2 mg/L of biomass): the sum of all terms of its oxygen demand."""
+    """Turnover in a step (um2 mg/L of biomass): the sum of the magnitudes of all terms of the
+    oxygen demand."""
     acceptor, donor = (used + unmet for used, unmet in zip(ledger.consumed, ledger.unmet))
     demand = kinetics.decay_oxygen_demand
     of_donor = kinetics.acceptor_to_donor_ratio / demand + kinetics.yield_coefficient
@@ -185,9 +194,10 @@ def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
 
 
 def _exchanged(limits: Limits, after: Pore, ledger: Ledger, kind: Substrate) -> float:
-    """Amount exchanged other than by flow, um2 mg/L, to which the defect is compared.
+    """Amount exchanged other than by flow, um2 mg/L: a lower bound of the defect's divisor.
 
-    It is the diffusion in a step, and at least the content of the mesh if that is stored.
+    It is the diffusion in a step. If the transport stores substrates, it is at least the content of
+    the mesh.
     """
     fastest = max(kind.diffusivity, kind.diffusivity_in_aggregate)
     exchanged = (ledger.end - ledger.start) * fastest * kind.supply

@@ -1,6 +1,6 @@
-"""Ends of the model within a run (section 5), which are not failures.
+"""Ends of the model within a run (section 5). They are not failures.
 
-Each end is an event: a margin that is zero at the event and positive after it.
+Each end is an event with a margin: zero at the event and positive after it.
 
     detachment    traction that a wall must bear / growth.bonding_strength - 1
     tearing       largest tensile stress / growth.tensile_strength - 1
@@ -9,27 +9,28 @@ Each end is an event: a margin that is zero at the event and positive after it.
     meeting       1 - film between two aggregates / growth.minimum_film
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
-The largest margin is judged at t = 0, at the end of each step, and on both sides of a jump of the
-scene's tables, where the aggregate takes its new equilibrium at once. If it is positive, shorter
-steps from the same start locate its zero (:func:`locate`): the first of all ends. The run ends with
-that state, because the model has no law for what follows. A margin that becomes positive and
-negative again within one step is not noticed.
+The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the
+scene's tables. At a jump the aggregate takes its new equilibrium at once. If the largest margin is
+positive, shorter steps from the same start locate its zero (:func:`locate`). This is the first of
+all ends in the step. The run ends with that state, because the model has no law for what follows. A
+margin that becomes positive and negative again within one step is not detected.
 
-With growth.after_detachment = "continue" an aggregate that detaches from its only wall, or that
-erosion has worn down, leaves the pore, and the run goes on. If it touches both walls and one of
-them gives way, or erosion takes a contact surface, the run ends: the model has no law for a surface
-that is set free.
+With growth.after_detachment = "continue", an aggregate leaves the pore if it detaches from its only
+wall or if erosion has worn it down, and the run continues. The run still ends if one of two touched
+walls cannot hold the aggregate, or if erosion removes a contact surface: the model has no law for a
+surface that becomes free.
 
-With growth.meeting = "weld" two aggregates on opposite walls that meet join
-(:mod:`repro.model.welding`), and the run goes on, unless :attr:`repro.Scene.without_weld` says why
-they cannot.
+With growth.meeting = "weld", two aggregates on opposite walls join when they meet
+(:mod:`repro.model.welding`), and the run continues. :attr:`repro.Scene.without_weld` gives the
+reason if they cannot join.
 
-With growth.until = "steady" a run also ends after a step in which the aggregates hardly change
+With growth.until = "steady", a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
 
-Two ends have no margin, and are not located. A step without a smooth equilibrium ends a run as a
-fold if the surface can crease (:mod:`repro.march.folding`). Biomass that is born without stress has
-no strain that accumulates, and so no limit of a fold.
+Two ends have no margin and are not located: a step without a smooth equilibrium, if the surface can
+crease (a fold, :mod:`repro.march.folding`), and a contact surface that erosion removes within a
+step (:mod:`repro.march.eroding`). With growth.new_biomass = "stress_free" strain does not
+accumulate, so the fold in the table is not tested.
 """
 
 from __future__ import annotations
@@ -53,15 +54,16 @@ from repro.model.solving import Solved
 from repro.scene import Pore as Channel
 from repro.scene import Scene, Stated, TimeTables
 
-#: An end is located if its margin is positive and at most this. The relative error of its time is
-#: this over d ln(stress) / d ln(t). The least numerics.tolerance of a preset is 2.5e-4.
+#: An end is located if its margin is positive and at most CLOSE. The relative error of its time is
+#: CLOSE / (d ln(stress) / d ln(t)). The least numerics.tolerance of a preset is 2.5e-4.
 CLOSE = 1e-4
-#: A margin that rises by more within this part of the time, or within this time (h), jumps.
+#: A margin jumps if it rises by more than CLOSE within this part of the time, or this time (h).
 SAME_MOMENT = 1e-5
 SHORTEST_MOMENT = 1e-8
-#: A trial divides the interval into parts of at least this fraction.
+#: A trial divides the interval. Each part is at least this fraction of the interval.
 LEAST_PART = 0.02
-#: Least distance (elements of the fluid) to an end of the pore for which a mesh is generated.
+#: No mesh is generated if the aggregate is nearer than this to an end of the pore (elements of the
+#: fluid).
 LEAST_ELEMENTS = 0.1
 
 
@@ -89,10 +91,10 @@ class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
 
     With ``growth.meeting = "weld"``, the default, two aggregates on opposite walls join instead,
-    and the run goes on.
+    and the run continues.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
-    failure: the message names the time (h), the aggregates and the place (um).
+    failure: the message names the time (h), the aggregates and the coordinates (um).
 
     Examples
     --------
@@ -111,9 +113,9 @@ class Detachment(RunEnd):
     """The aggregate detaches from a wall, tears, or is eroded.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
-    failure: the message names the time (h), the place (um), the stress there and the strength that
-    it exceeds; or what erosion has left. It needs ``growth.bonding_strength``,
-    ``growth.tensile_strength`` or ``[growth.erosion]``.
+    failure. The message names the time (h), the coordinates (um), the stress there and the exceeded
+    strength. After erosion it names the remaining thickness or contact length (um). The scene needs
+    ``growth.bonding_strength``, ``growth.tensile_strength`` or ``[growth.erosion]``.
 
     Examples
     --------
@@ -148,10 +150,10 @@ class Steady(RunEnd):
 
 @dataclass(frozen=True)
 class Event:
-    """An end of a run: its margin in a state, and the exception that reports it there.
+    """An end of a run in one state: its margin, and the exception that reports it.
 
-    leaves: place in the list of the aggregate that leaves the pore instead if the scene continues
-    after detachment; None if the run ends. joins: do two aggregates join instead?
+    leaves: index of the aggregate that leaves the pore if growth.after_detachment = "continue";
+    None if the run ends. joins: do two aggregates join, so that the run continues?
     """
 
     margin: float
@@ -162,7 +164,7 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """A step, the solution at its end, and the end of the run that is nearest there."""
+    """A step, the solution at its end, and the event with the largest margin at its end."""
 
     step: StepResult
     solved: Solved
@@ -174,7 +176,10 @@ class Reached:
         return self.step.pore.time
 
     def unlocated(self, after: float, error: Exception) -> Reached:
-        """The same if a shorter step fails; after: h, the last time before the event."""
+        """The same, with a message that the event is not located because a shorter step fails.
+
+        after: h, the last time before the event.
+        """
         end = self.event.end
         text = (f"{end}; it may happen earlier, after t = {after:g} h, since a shorter step fails: "
                 f"{error}")
@@ -182,21 +187,24 @@ class Reached:
 
     @property
     def joins(self) -> bool:
-        """Do two aggregates join there?"""
+        """Do two aggregates join at the end of the step?"""
         return self.event.joins and self.event.margin > 0
 
     def leaves(self, continues: bool) -> int | None:
-        """Place in the list of the aggregate that leaves the pore there, None without one.
+        """Index of the aggregate that leaves the pore at the end of the step; None if none leaves.
 
-        continues: may it leave?
+        continues: is growth.after_detachment = "continue"?
         """
         return self.event.leaves if continues and self.event.margin > 0 else None
 
 
 @dataclass(frozen=True, eq=False)
 class Strength:
-    """A stress (MPa) that an aggregate withstands: its key of [growth], and the key's value as the
-    scene states it."""
+    """A strength of an aggregate.
+
+    key: of [growth]; stress: MPa, the largest stress that it withstands; stated: the key's value as
+    the scene states it.
+    """
 
     key: str
     stress: float
@@ -211,9 +219,11 @@ class Strength:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """Data from which the ends of a run follow; None for strengths that the scene leaves out.
-    tables: over time, before whose last time no state is steady; without_weld: as
-    :attr:`repro.Scene.without_weld`."""
+    """Data from which the ends of a run follow.
+
+    bonding, tensile: None if the scene does not have the strength; tables: of the scene over time;
+    a state is steady only after their last time; without_weld: as :attr:`repro.Scene.without_weld`.
+    """
 
     channel: Channel
     loading: Loading
@@ -230,7 +240,7 @@ class Ends:
 
 
 def nearest_end(ends: Ends, pore: Pore, solved: Solved, start: Pore | None = None) -> Event:
-    """The end with the largest margin in a state; start: of the step that leads to it, if any."""
+    """The event with the largest margin in a state; start: state before the last step, if any."""
     events = list(_events(ends, pore, solved))
     if start is not None and ends.loading.growth.until_steady:
         events.append(steadiness(ends, start, pore))
@@ -238,10 +248,11 @@ def nearest_end(ends: Ends, pore: Pore, solved: Solved, start: Pore | None = Non
 
 
 def steadiness(ends: Ends, start: Pore, pore: Pore) -> Event:
-    """The event of a steady state after a step: CLOSE if area, thickness and length of each
-    aggregate change by less than the tolerance in the mean over the step, else -1.
+    """The event of a steady state after a step from ``start`` to ``pore``.
 
-    The tables over time must be past their last time, and no aggregate may leave in the step.
+    Its margin is CLOSE if area, thickness and length of each aggregate change by less than the
+    tolerance in the mean over the step, and -1 otherwise. The step must start after the last time
+    of the tables, and no aggregate may leave in the step.
     """
     tolerance = ends.loading.growth.steady_tolerance
     change = inf
@@ -250,7 +261,7 @@ def steadiness(ends: Ends, start: Pore, pore: Pore) -> Event:
             [_extents(before) for before in start.outlines])
         change = float(np.abs(np.log(ratios)).max(initial=0.0)) / (pore.time - start.time)
     end = Steady(f"the aggregates are steady at t = {pore.time:g} h: their area, thickness and "
-                 f"length change by {change:.2g} of themselves per h at most; "
+                 f"length change by at most {change:.2g} per h, relative to their values; "
                  f"growth.steady_tolerance is {tolerance:g} 1/h")
     return Event(CLOSE if change < tolerance else -1.0, end)
 
@@ -285,7 +296,7 @@ def _events(ends: Ends, pore: Pore, solved: Solved) -> Iterator[Event]:
 
 
 def _eroded(least: float, pore: Pore) -> Iterator[Event]:
-    """The events of all aggregates that erosion wears down; least: um."""
+    """The events of all aggregates that erosion wears down; least: um, growth.minimum_film."""
     for number, (body, outline) in enumerate(zip(pore.bodies, pore.outlines)):
         own, *_ = body.seat.walls(pore.mesh.walls)
         extent = min(outline.thickness, outline.contact_length(own))
@@ -305,7 +316,7 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
 
 
 def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:
-    """Names of each pair of aggregates, the film (um) between them and its place (2,) um."""
+    """For each pair of aggregates: their names, the least film (um) and its coordinates (2,) um."""
     if pore.welded:
         return
     for (one, outline), (other, beside) in combinations(zip(pore.bodies, pore.outlines), 2):
@@ -314,7 +325,7 @@ def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:
 
 def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: str, subject: str,
                 leaves: int | None = None) -> Event:
-    """The event of a strength; its message has the stress in the unit that the scene gives."""
+    """The event of a strength; its message gives the stress in the unit that the scene uses."""
     stated = strength.stated
     ratio = peak.value / strength.stress
     end = Detachment(f"{pore.name_of(number)} {verb} at t = {pore.time:g} h: near x = "
@@ -325,18 +336,18 @@ def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: s
 
 
 def farthest(pore: Pore, side: str) -> int:
-    """Place in the list of the aggregate that is nearest to an end of the pore."""
+    """Index of the aggregate that is nearest to an end of the pore."""
     return int(np.argmax(_tips(pore, side)))
 
 
 def elements_to_end(channel: Channel, pore: Pore, side: str) -> float:
-    """Distance of the nearest aggregate from an end of the pore, in elements of the fluid."""
+    """Distance of the nearest aggregate from an end of the pore, over the fluid's element size."""
     tip = max(_tips(pore, side), default=-inf)
     return (channel.length / 2 - tip) * ACROSS_PORE / channel.width
 
 
 def _tips(pore: Pore, side: str) -> list[float]:
-    """Distance (um) of each aggregate's tip from the middle of the pore, towards an end."""
+    """Signed distance (um) of each aggregate's tip from the middle of the pore towards an end."""
     return [-outline.upstream if side == "upstream" else outline.downstream
             for outline in pore.outlines]
 
@@ -364,7 +375,7 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
     Parameters
     ----------
     reach : callable
-        Makes a shorter step from the same start to a time (h).
+        reach(time) makes a shorter step from the same start to a time (h).
     start, margin : float
         Start of the step (h), and the largest margin there, which is not positive.
     passed : Reached
@@ -373,9 +384,9 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
     Returns
     -------
     Reached
-        The step to the event. Its margin is positive and at most CLOSE, or jumps there. If a
-        shorter step fails, it is the shortest one that has passed the event, and the message says
-        so.
+        The step to the event. Its margin is positive and at most CLOSE, unless the margin jumps
+        there. If a shorter step fails, the result is the shortest step that has passed the event,
+        and the message says so.
     """
     low, high = margin - CLOSE / 2, passed.event.margin - CLOSE / 2
     side = 0

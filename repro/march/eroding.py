@@ -1,10 +1,11 @@
-"""A step with erosion: surfaces recede for half of it, biomass grows for all of it, and surfaces
-recede for the other half (Strang's splitting, of second order if its parts are).
+"""A step with erosion, by Strang's splitting.
 
-The growth is that of :mod:`repro.march.midpoint`, the erosion that of :mod:`repro.model.erosion`.
-What the surfaces pass in both halves is the detached mass of the step's ledger. The error estimate
-of growth gets a second part: the difference of the masses detached in both halves, over the
-biomass. A row within a step is that of a shorter step.
+Surfaces recede for half of the step, biomass grows for the whole step, and surfaces recede for the
+other half. The splitting is of second order if its parts are. :mod:`repro.march.midpoint` computes
+the growth, :mod:`repro.model.erosion` the erosion. The ledger's detached mass is the biomass that
+both halves of the erosion remove. The error estimate of growth gets a second term: the difference
+of the masses that both halves remove, over the biomass. A row within a step is the end of a shorter
+step.
 """
 
 from __future__ import annotations
@@ -28,7 +29,11 @@ from repro.scene import needed
 
 def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
             largest_change: float = np.inf, search: SearchOptions = PATIENT) -> Attempt:
-    """Attempt a step of ``duration`` (h), as :func:`midpoint.attempt` does without erosion."""
+    """Attempt a step of ``duration`` (h) with erosion.
+
+    Arguments and errors are those of :func:`midpoint.attempt`. Also raises ErosionError if a
+    surface recedes too far, and Detachment if a contact surface vanishes.
+    """
     if not previous.bodies:
         return midpoint.attempt(stages, previous, solved, duration, largest_change, search)
     start, at_start = stages.grading.solve(_erode(stages, previous, duration / 2, solved))
@@ -58,6 +63,6 @@ def _erode(stages: Stages, pore: Pore, duration: float, solved: Solved) -> Pore:
 
 
 def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) -> InterpolatedState:
-    """The state at a time (h) within a step, by a shorter step."""
+    """The state at a time (h) within a step: the end of a shorter step."""
     step = needed(attempt(stages, previous, solved, time - previous.time).step, "a shorter step")
     return InterpolatedState(*stages.grading.solve(replace(step.pore, time=time)))

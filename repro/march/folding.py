@@ -1,10 +1,10 @@
 """Folding of the aggregate's surface: an end of the model, not a failure.
 
-See :mod:`repro.model.surface`. A run ends where the stretch comes to Biot's limit
-(:mod:`repro.march.ends`). A step without a smooth equilibrium fails like any other step. If the
-surface can crease already, the failure is reported as a fold. A later failure is reported as a fold
-too: the surface has buckled in between. The time of this fold is only known to lie in the failing
-step: one of growth.time_step in the paper's scheme, a thousandth of it in the midpoint rule.
+:mod:`repro.model.surface` computes the stretch. A run ends where the stretch reaches Biot's limit
+(:mod:`repro.march.ends`). A step without a smooth equilibrium fails. The failure is reported as a
+fold if the surface can crease, or if it could at any earlier time of the run: the surface may have
+buckled since. The fold lies within the failing step. This step is growth.time_step long in the
+paper's scheme, and a thousandth of it in the midpoint rule.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.pore import Pore
 from repro.model.surface import surfaces
 
-#: The surface folds if no equilibrium exists and its stretch has been below this, 5 % above CREASE:
-#: the stretch varies by up to 6 % within an edge, and runs stop at up to 0.677 (docs/design.md).
+#: A step without equilibrium is a fold if the surface's stretch has been below this. The bound is
+#: 5 % above CREASE, because the stretch varies by up to 6 % within an edge, and runs stop at up to
+#: 0.677 (docs/design.md).
 CREASING = 0.68
 #: Accepted range of the density at a node, over X_m.
 DENSITIES = 0.5, 2.0
@@ -46,8 +47,8 @@ class Fold(RunEnd):
 def most_compressed(earlier: Compression, pore: Pore) -> Compression:
     """Return the compression of a pore if its stretch is smaller than an earlier one.
 
-    An energy without limits of the stretch leaves the earlier one. Where strain counts from the
-    last shape, compression does not accumulate: that of the later pore is returned.
+    If no energy has limits of the stretch, the result is the earlier compression. If strain counts
+    from the last shape, compression does not accumulate, and the result is that of ``pore``.
     """
     if not any(body.solid.energy.crease for body in pore.bodies):
         return earlier
@@ -60,7 +61,8 @@ def most_compressed(earlier: Compression, pore: Pore) -> Compression:
 def refuse_fold(expanded: Pore) -> None:
     """Raise GrowthError if a step alone compresses the surface below Biot's limit.
 
-    It applies where strain counts from the last shape: a shorter step compresses the surface less.
+    The test applies only if strain counts from the last shape. A shorter step then compresses the
+    surface less.
     """
     compression = most_compressed(Compression(), expanded)
     if not expanded.accumulates and compression.stretch < expanded.biot:
@@ -70,9 +72,9 @@ def refuse_fold(expanded: Pore) -> None:
 
 @contextmanager
 def folding(compression: Compression, time: float) -> Iterator[None]:
-    """Raise Fold if a step has no equilibrium and the surface could crease.
+    """Raise Fold in place of GrowthError or MeshError if the surface could crease.
 
-    time: h, of the last row or step.
+    compression: the largest one of the run so far; time: h, of the last row or step.
     """
     try:
         yield
@@ -93,11 +95,10 @@ def fold_message(when: str, compression: Compression) -> str:
 
 
 def refuse_density(previous: Pore, pore: Pore, maximum_density: float) -> None:
-    """Raise GrowthError if the density is out of bounds: J = theta does not hold.
+    """Raise GrowthError if the density is out of bounds, so that J = theta is violated.
 
-    previous: the pore before the step. On a new mesh the step has no equilibrium yet, and J is
-    rough where strain is singular, so densities are judged only if the step keeps the mesh.
-    maximum_density: X_m, mg/L.
+    previous: the pore before the step; maximum_density: X_m, mg/L. Densities are tested only if the
+    step keeps the mesh: a new mesh has no equilibrium yet, and J is rough where strain is singular.
     """
     if not pore.bodies or pore.mesh.topology is not previous.mesh.topology:
         return

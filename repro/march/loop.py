@@ -1,17 +1,17 @@
 """The loop of steps of every scheme.
 
 Steps depend neither on the requested rows nor on the end of the run, to the last bit. A row between
-two steps is interpolated in the step that passes it, and no step starts from it. If a row cannot be
-computed, the state has the reason, and the run goes on. If ``growth.end`` or an end of the
-model (:mod:`repro.march.ends`) lies within a step, that step is cut there. Rows before the end
-still belong to the uncut step, and the ledger of the cut step closes like the others. A run to a
-later end restarts from the state before the cut step.
+the ends of two steps is interpolated within a step, and no step starts from it. If a row cannot be
+computed, the state contains the reason, and the run continues. If ``growth.end`` or an end of the
+model (:mod:`repro.march.ends`) lies within a step, the step is cut there. Rows before the end are
+still interpolated in the uncut step. The ledger of the cut step balances like the others. A run to
+a later end restarts from the state before the cut step.
 
-A step ends at a jump of the scene's tables. Its row has the state just after the jump: with forces
-of the fluid the aggregate takes its new equilibrium there, as it does at t = 0 (:func:`settle`). A
-step also ends where an aggregate leaves the pore (``growth.after_detachment``). Its row has the
-state just after that, without the aggregate, and its ledger has the mass that has left. Where two
-aggregates meet and join (``growth.meeting``), a step ends with the state just after that.
+A step ends at a jump of the scene's tables. Its row has the state just after the jump: with fluid
+forces the aggregate takes its new equilibrium there, as at t = 0 (:func:`settle`). A step also ends
+when an aggregate leaves the pore (``growth.after_detachment``) or when two aggregates join
+(``growth.meeting``). Its row has the state just after this event, and its ledger contains the mass
+that has left.
 """
 
 from __future__ import annotations
@@ -51,17 +51,17 @@ from repro.scene import Growth, Scene, TimeTables
 
 @dataclass(frozen=True)
 class Stepping:
-    """How steps are made in time.
+    """Time stepping of a scheme.
 
-    advance(stages, pore, solved, step_control): makes one step, and returns its StepResult, the
-    solution after it and the step control of the next one. The length of the step does not depend
-    on ``growth.end`` or on the requested rows; a step that passes ``growth.end`` is cut there. The
-    solution is that before a jump of the scene's tables.
-    cut(stages, pore, solved, time): makes a shorter step to a time (h), and returns its StepResult
-    and the solution after it.
-    rows(growth): times (h) of rows besides the ends of steps, without requested ones; first:
-    length of the first attempted step, as a multiple of growth.time_step; ends(scene): times (h) at
-    which steps end, if known in advance.
+    advance(stages, pore, solved, step_control): makes one step. Returns its StepResult, the
+    solution after it and the step control of the next step. The length of the step does not depend
+    on ``growth.end`` or on the requested rows. A step that passes ``growth.end`` is cut there. At a
+    jump of the scene's tables the solution is that before the jump.
+    cut(stages, pore, solved, time): makes a shorter step to a time (h). Returns its StepResult and
+    the solution after it.
+    rows(growth): times (h) of rows without ``output.times``, besides the ends of steps.
+    first: length of the first attempted step, as a multiple of growth.time_step.
+    ends(scene): times (h) at which steps end, if known in advance.
     """
 
     advance: Callable[[Stages, Pore, Solved, StepControl], tuple[StepResult, Solved, StepControl]]
@@ -73,9 +73,9 @@ class Stepping:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What the loop takes from a scene with growth.
+    """Data of a scene with growth for the loop.
 
-    limits: of balances; rows: times (h) of rows after t = 0; every_step: does each step have a row,
+    limits: of balances; rows: times (h) of rows after t = 0; every_step: does each step have a row
     too?
     """
 
@@ -88,7 +88,7 @@ class Course:
 
     @classmethod
     def of(cls, scene: Scene, stepping: Stepping) -> Course:
-        """Take the parts of a scene."""
+        """Read the data of a scene."""
         return cls(Stages.of(scene), stepping, Ends.of(scene), Limits.of(scene),
                    row_times(stepping, scene), scene.requested_times is None)
 
@@ -97,9 +97,10 @@ def steps(scene: Scene, stepping: Stepping,
           state: RestartState | None = None) -> Iterator[tuple[RestartState, Report | None]]:
     """Yield the state after every step from t = 0 or ``state`` on, with a Report if one is due.
 
-    The scene has growth. Raises SimulationError if a stage fails. After the last Report, raises
-    PoreEnd if an aggregate reaches an end of the pore, Fold if its surface folds, Meeting if two
-    aggregates meet, Detachment if one leaves a wall, tears or is eroded, and Steady.
+    The scene must have growth. Raises SimulationError if a stage fails. After the last Report,
+    raises PoreEnd if an aggregate reaches an end of the pore, Fold if its surface folds, Meeting if
+    two aggregates meet, Detachment if an aggregate leaves a wall, tears or is eroded, and Steady if
+    growth.until = "steady" and the aggregates are steady.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
@@ -118,9 +119,9 @@ def steps(scene: Scene, stepping: Stepping,
 
 
 def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
-    """Bring the aggregate to its equilibrium under the forces of the fluid at its time.
+    """Bring the aggregate to its equilibrium under the fluid forces at the time of ``pore``.
 
-    Returns the pore, and flow and substrates in it. Without forces of the fluid nothing changes.
+    Returns the pore, and flow and substrates in it. Without fluid forces nothing changes.
     """
     if not stages.growth.has_fluid_forces:
         return pore, solved
@@ -132,7 +133,7 @@ def settle(stages: Stages, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
 
 def _grow(course: Course, state: RestartState,
           solved: Solved) -> Iterator[tuple[RestartState, Report | None]]:
-    """Yield the state after every step from ``state`` on, whose solution is ``solved``."""
+    """Yield the state after every step from ``state`` on; solved: solution in ``state``."""
     stages = course.stages
     pore = replace(state.pore, concentrations=solved.concentrations)
     event = nearest_end(course.ends, pore, solved)
@@ -182,9 +183,9 @@ def _grow(course: Course, state: RestartState,
 
 def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
              margin: float) -> tuple[Reached, StepControl]:
-    """Make one step, or a shorter one to the first end of the model within it.
+    """Make one step, or a shorter step to the first end of the model within it.
 
-    margin: at the start of the step (see :mod:`repro.march.ends`).
+    margin: largest margin at the start of the step (see :mod:`repro.march.ends`).
     """
     stages = course.stages
     stepping = course.stepping
@@ -211,7 +212,7 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
 
 def _after_detachment(stages: Stages, reached: Reached,
                       number: int) -> tuple[StepResult, Solved]:
-    """Return the state just after an aggregate, by its place in the list, has left the pore."""
+    """Return the state just after the aggregate with index ``number`` has left the pore."""
     step = reached.step
     mass = step.pore.bodies[number].mass
     remaining = stages.without(step.pore, number, reached.solved)
@@ -240,7 +241,7 @@ def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepR
 
 def _row_within(stages: Stages, pore: Pore, step: StepResult,
                 time: float) -> tuple[InterpolatedState | None, str]:
-    """Return the state at a time (h) within a step, or why it cannot be computed; pore: before."""
+    """Return the state at a time (h) within a step, or None and the reason; pore: before it."""
     try:
         with np.errstate(all="raise", under="ignore"):
             inner = step.within(time)
@@ -251,7 +252,7 @@ def _row_within(stages: Stages, pore: Pore, step: StepResult,
 
 
 def row_times(stepping: Stepping, scene: Scene) -> tuple[float, ...]:
-    """Return the times (h) of rows after t = 0, ascending: those of [output], or the scheme's."""
+    """Return the times (h) of rows after t = 0, ascending: output.times, or the scheme's times."""
     requested = scene.requested_times
     return stepping.rows(scene.growing.growth) if requested is None else requested
 
@@ -263,35 +264,36 @@ def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
 
 def _after_step(state: RestartState, step: StepResult, solved: Solved,
                 control: StepControl) -> RestartState:
-    """Return the state after one more step, which is not reported yet."""
+    """Return the state after one more step, not yet reported."""
     before = newton_counts(step.before[1]) if step.before else {}
     counts = sum_counts(state.iterations, {"growth": step.iterations}, before,
                         newton_counts(solved))
     ledgers = (*state.ledgers, step.ledger)
     remeshes = state.remeshes + step.remeshed
     detached = len(step.pore.bodies) < len(state.pore.bodies)
-    earlier = Compression() if detached else state.compression  # it may be that of the lost one
+    # The least stretch so far may be that of a detached aggregate.
+    earlier = Compression() if detached else state.compression
     return RestartState(step.pore, control, ledgers, remeshes, counts, state.row,
                         most_compressed(earlier, step.pore))
 
 
 def make_report(state: RestartState, pore: Pore, solved: Solved,
                 before: tuple[Pore, Solved] | None, shown: Topology) -> Report:
-    """Report the steps of a state since the last report, whose mesh has the topology ``shown``."""
+    """Make the Report of a state; shown: topology of the mesh in the last Report."""
     return Report(pore, solved, before, state.ledgers, state.remeshes, state.iterations,
                   pore.mesh.topology is not shown)
 
 
 def mark_reported(state: RestartState, time: float) -> RestartState:
-    """Return the state after a row at a time (h), without steps to report."""
+    """Reset the counters of a state; time (h): of the row just reported."""
     return RestartState(state.pore, state.step_control, row=time, compression=state.compression)
 
 
 def time_before_end(previous: Pore, duration: float) -> float:
-    """Time (h) just before the end of a step, before a jump of the scene's tables there."""
+    """Time (h) just before the end of a step, and so before a jump of the tables at this end."""
     return max(previous.time, previous.time + duration - SAME_TIME)
 
 
 def before_jump(tables: TimeTables, pore: Pore) -> Pore:
-    """Return the pore at its time, or just before it if the scene's tables jump there."""
+    """Return the pore at its time, or just before if the scene's tables jump at this time."""
     return replace(pore, time=pore.time - SAME_TIME) if tables.jumps(pore.time) else pore

@@ -1,15 +1,16 @@
 """One step of the midpoint rule, second order in time: see :mod:`repro.march.stepping`.
 
-Half a step with the rates at its start gives the shape half way. There the substrates are solved
-with the *mean* biomass over the step, computed with the rates being solved for: M (e^z - 1) / z for
-a mass M that grows by e^z. These rates integrate (9)-(10) over the entire step. Uptake and growth
-in a step are then one integral, and both balances close to round-off.
+Half a step with the rates at its start gives the shape half way. The substrates are solved in this
+shape with the *mean* biomass over the step: M (e^z - 1) / z for a mass M that grows by e^z. The
+mean depends on the rates being solved for. These rates integrate (9)-(10) over the entire step.
+Uptake and growth in a step are then one integral, and both balances close to round-off.
 
-A row at the fraction s of a step of length h integrates (9)-(10) over s h with the rates (1 - s)
-k_1 + s k_2, where k_1 are the rates at the start and k_2 those half way. This interpolation is of
-second order too. At s = 1 it equals the step, which integrates k_2 over h (Hairer, Norsett and
-Wanner, Solving Ordinary Differential Equations I, section II.6). Shape, contact and mesh follow
-from those at the start, as in a step. Flow and substrates are solved in this shape.
+A row at the fraction s of a step of length h integrates (9)-(10) over s h with the rates
+(1 - s) k_1 + s k_2, where k_1 are the rates at the start and k_2 the rates half way. This
+interpolation is of second order too. At s = 1 it equals the step, which integrates k_2 over h
+(Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.6). Shape,
+contact and mesh are advanced from the start, as in a step. Flow and substrates are solved in this
+shape.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ from repro.model.transport import Concentrations, integrated
 class Attempt:
     """Attempted step of the midpoint rule.
 
-    step: its result, None if the rates change too much or if it ends long after the first contact;
-    change: mean change of the rates over its first half, 1/h; gaps: least distance (um) to a
-    wall without contact before and after the step, if the step makes the first contact with it.
+    step: the result, None if the rates change too much or if the step ends too long after the first
+    contact with a wall; change: 1/h, mean change of the rates over the first half; gaps: (um,
+    um), least distance to this wall before and after the step, None without a first contact.
     """
 
     step: StepResult | None
@@ -55,11 +56,11 @@ class Attempt:
 class Halfway:
     """Solution half way through a step.
 
-    duration: h, of the entire step; first: rates at its start; expansion: the aggregate half way;
+    duration: h, of the entire step; first: rates at its start; expansion: the aggregates half way;
     solved: flow and substrates half way; rates: half way, at the points of the mesh at the start;
-    produced: growth of active and of inert biomass of each aggregate over the entire step, um2
-    mg/L; generated: meshes that the step has generated so far; end: the aggregate at the end, None
-    before it is known.
+    produced: for each aggregate, increase of active and of inert biomass over the entire step, um2
+    mg/L; generated: meshes that the step has generated so far; end: the aggregates at the end, None
+    until they are computed.
     """
 
     duration: float
@@ -76,8 +77,9 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
             largest_change: float = np.inf, search: SearchOptions = PATIENT) -> Attempt:
     """Attempt a step of ``duration`` (h).
 
-    It succeeds if the rates change by at most ``largest_change`` (1/h) over its first half. Raises
-    StageError if a stage fails.
+    The step succeeds if the rates change by at most ``largest_change`` (1/h) over its first half.
+    Raises StageError if a stage fails, and RunEnd if the step passes an end of the pore or if
+    aggregates overlap.
     """
     first = stages.rates(previous, solved)
     try:
@@ -124,9 +126,10 @@ def _with_line_speeds(new: Pore, previous: Pore, expansion: Expansion, duration:
 
 def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: float,
             search: SearchOptions) -> Expansion:
-    """Equilibrium of the aggregate at a part of the step, starting from its known shapes.
+    """Equilibrium of the aggregates at a fraction ``part`` of the step.
 
-    Contact lines start at their interpolated places and have small triangles there.
+    The search starts from the shapes known so far. Contact lines start at interpolated positions
+    and have small triangles there.
     """
     shapes = _known_shapes(half, part)
     advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
@@ -138,10 +141,11 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
 
 def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, duration: float,
                   search: SearchOptions) -> Halfway:
-    """Solve in the shape after half of ``duration`` (h) with the rates at the start.
+    """Solve in the shape half way through a step of ``duration`` (h).
 
-    If the moved mesh is not acceptable, a new one replaces it. Masses are carried to its points,
-    and rates back to the points of the material.
+    The rates at the start give this shape. If the moved mesh is not acceptable, a new mesh replaces
+    it. The masses are then carried to the points of the new mesh, and the rates back to the points
+    of the mesh at the start.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
     advances: dict[tuple[int, int, int], float] = {}
@@ -172,11 +176,10 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
 
 def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
-    """Interpolate the pore to a time (h) within a step, as the step itself advances, and solve
-    there.
+    """Advance the pore to a time (h) within a step with interpolated rates, and solve there.
 
-    If the moved mesh is not acceptable, the nearest of the meshes that the step has generated
-    replaces it.
+    If the moved mesh is not acceptable, one of the meshes that the step has generated replaces it,
+    the nearest in time first.
     """
     part = (time - previous.time) / half.duration
     mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,
@@ -190,7 +193,7 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
 
 
 def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rates) -> Rates:
-    """Interpolate rates at the points of a new mesh back to those of the previous mesh."""
+    """Interpolate rates from the points of a new mesh back to the points of the previous mesh."""
     mesh = middle.mesh
     nodal = np.column_stack([middle.space.integration.to_nodes(field)
                              for field in (rates.growth, rates.remains)])
@@ -203,10 +206,10 @@ def _carry_rates_back(middle: Pore, previous: Pore, half: Expansion, rates: Rate
 
 def _match_production(previous: Pore, after: Pore,
                       produced: tuple[tuple[float, float], ...]) -> Pore:
-    """Correct the growth of each aggregate to that computed half way, to the last bit.
+    """Correct the growth of each aggregate to ``produced``, to the last bit.
 
-    The difference is due to the interpolation of the rates. It is added in proportion to the active
-    biomass.
+    The interpolation of the rates causes the difference. The correction is distributed in
+    proportion to the active biomass.
     """
     bodies = []
     for old, new, (active, inert) in zip(previous.bodies, after.bodies, produced):
@@ -219,17 +222,17 @@ def _match_production(previous: Pore, after: Pore,
 
 
 def _guess_substrates(start: Solved, half: Halfway, part: float) -> Concentrations:
-    """Initial guess of the substrates at a part of the step."""
+    """Initial guess of the substrates at a fraction of the step."""
     first = start.substrates.concentrations
     return _extrapolate_substrates(first, half.solved.substrates.concentrations, part)
 
 
 def _extrapolate_substrates(first: Concentrations, second: Concentrations,
                             part: float) -> Concentrations:
-    """Extrapolate concentrations to a part of the step, from its start and half way.
+    """Extrapolate concentrations from the start and half way to a fraction ``part`` of the step.
 
-    If the extrapolation is negative anywhere, the guess is the solution half way. If the mesh has
-    changed half way, the guess is the solution at the start.
+    The result is ``second``, the solution half way, if the extrapolation is negative anywhere. It
+    is ``first``, the solution at the start, if the mesh has changed half way.
     """
     if second.fields.shape != first.fields.shape:
         return first
@@ -240,7 +243,10 @@ def _extrapolate_substrates(first: Concentrations, second: Concentrations,
 
 
 def _scale_shape(previous: Pore, after: Pore) -> Pore:
-    """Initial guess of the shape: an aggregate on one wall is scaled by the root of its growth."""
+    """Initial guess of the shape.
+
+    An aggregate on one wall is scaled by the square root of the ratio of its masses.
+    """
     points = previous.mesh.points.copy()
     for before, grown, region, outline in zip(previous.bodies, after.bodies, previous.mesh.regions,
                                               previous.outlines):
@@ -253,16 +259,18 @@ def _scale_shape(previous: Pore, after: Pore) -> Pore:
 
 
 def _known_shapes(half: Halfway, part: float) -> list[tuple[float, Expansion]]:
-    """Weights of the known shapes of a step at a part of it, besides that of its start: the shape
-    is extrapolated from the first half, or interpolated in start, half way and end if the end is
-    known."""
+    """Known shapes of a step, without the start, and their weights at a fraction of the step.
+
+    If the shape at the end is known, the weights interpolate between start, half way and end.
+    Otherwise they extrapolate from the first half.
+    """
     if half.end is None:
         return [(2 * part, half.expansion)]
     return [(4 * part * (1 - part), half.expansion), (part * (2 * part - 1), half.end)]
 
 
 def _guess_shape(previous: Pore, shapes: list[tuple[float, Expansion]]) -> Pore:
-    """Initial guess of the shape, from those of :func:`_known_shapes`."""
+    """Initial guess of the shape from the result of :func:`_known_shapes`."""
     corners = previous.mesh.corners
     push = previous.pressure
     points = previous.mesh.points
@@ -273,7 +281,7 @@ def _guess_shape(previous: Pore, shapes: list[tuple[float, Expansion]]) -> Pore:
 
 
 def _place_bodies(after: Pore, points: np.ndarray) -> Pore:
-    """Move the aggregates' nodes to ``points``, unless this turns a triangle over."""
+    """Move the aggregates' nodes to ``points`` (N, 2) um, unless this turns a triangle over."""
     moved = after.moved(after.mesh.from_body(points[after.mesh.body], after.mesh.points))
     biomass_cells = np.flatnonzero(moved.mesh.biomass)
     return after if moved.mesh.turned_over(biomass_cells).any() else moved

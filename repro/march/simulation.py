@@ -53,7 +53,7 @@ def simulate(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] =
     unset : sequence of str, optional
         Keys or sections of the scene to leave out.
     scheme : repro.schemes.Scheme, optional
-        Another scheme than that of the preset, such as ``replace(PAPER, carrier="u")``.
+        Scheme in place of the preset's, for example ``replace(PAPER, carrier="u")``.
     shape : (K, 2) sequence of float, optional
         Boundary of the aggregate at t = 0, points (x, y) in um from the upstream to the downstream
         end on its wall. It replaces the shape of the only aggregate (see ``aggregate.outline``).
@@ -70,7 +70,7 @@ def simulate(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] =
     SceneError
         If the scene or the shape is not accepted.
     SimulationError
-        If a stage fails: names the time, the stage, the reason and a remedy.
+        If a stage fails. The message names the time, the stage, the reason and a remedy.
     PoreEnd
         After the last Report, if the aggregate reaches an end of the pore.
     Fold
@@ -108,8 +108,8 @@ def reports(states: Iterator[tuple[RestartState, Report | None]]) -> Iterator[Re
 def report_at(scene: Scene, state: RestartState | None, time: float) -> Report:
     """Return the Report of a row at a time (h), from an earlier state of the run or from t = 0.
 
-    Steps do not depend on rows, so that it is the one that the run would have had. Raises KeyError
-    if the state at this time cannot be computed.
+    Steps do not depend on rows, so the original run would have the same row. Raises KeyError if the
+    state at this time cannot be computed.
     """
     reason = "the run ends before"
     with suppress(RunEnd):
@@ -139,7 +139,7 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
 def ends_soon(scene: Scene, state: RestartState) -> bool:
     """Return whether the next step depends on growth.end, because it may be cut there.
 
-    A step may be STRETCH times as long as its step control proposes.
+    A step may be up to STRETCH times as long as its step control proposes.
     """
     end = scene.growth.end if scene.growth else math.inf
     return STRETCH * state.step_control.length > end - state.pore.time
@@ -160,14 +160,14 @@ def row_times(scene: Scene) -> tuple[float, ...]:
 
 
 def rows_within(scene: Scene) -> set[float]:
-    """Return the times (h) of rows that may lie within a step, not at a known end of one."""
+    """Return the times (h) of rows that may lie within a step, and not at its end."""
     if scene.growth is None:
         return set()
     return set(row_times(scene)) - {0.0, *_stepping(scene).ends(scene)}
 
 
 def _stepping(scene: Scene) -> Stepping:
-    """Return how the scheme of a scene makes its steps."""
+    """Return the time stepping of a scene's scheme."""
     if scene.numerics.scheme.controls_error:
         from repro.march import stepping
         return stepping.STEPPING
@@ -184,7 +184,7 @@ def steps(scene: Scene,
     Method(scene.numerics.solver).checked()
     if scene.growth is None:
         return _at_rest(scene, state)
-    from repro.march import loop  # a scene without growth loads no part of it
+    from repro.march import loop  # a scene without growth does not load the loop
     return loop.steps(scene, _stepping(scene), state)
 
 

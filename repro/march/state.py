@@ -1,4 +1,4 @@
-"""The state of a run after a step, what a row reports of it, and the failure of a step."""
+"""The state of a run after a step, the Report of a row, and the message of a failed step."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Dataclass(Protocol):
 
 Data = TypeVar("Data", bound=Dataclass)
 
-#: Two times (h) this close are the same time.
+#: Two times (h) are equal if they differ by at most this.
 SAME_TIME = 1e-9
 
 
@@ -46,8 +46,8 @@ class Report:
     solved : Solved
         Flow and substrates in the geometry of ``pore``.
     before : (Pore, Solved) or None
-        Pore and solution at the end of the last step, grown but not yet expanded (Plate 1). None
-        at t = 0, and if the next step fails.
+        Pore and solution at the end of the last step, after growth and before the expansion (Plate
+        1). None at t = 0, and if the next step fails.
     ledgers : tuple of Ledger
         Mass balances of the steps since the last report.
     remeshes : int
@@ -55,9 +55,9 @@ class Report:
     iterations : dict of str to int
         Newton iterations since the last report, by stage.
     new_mesh : bool
-        Is the mesh another one than in the last report?
+        Does the mesh differ from the mesh of the last report?
     departed : tuple of str
-        How aggregates left the pore at this time, while the run goes on.
+        For each aggregate that leaves the pore at this time, the message of its event.
     """
 
     pore: Pore
@@ -72,7 +72,8 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class InterpolatedState:
-    """Pore and solution interpolated within a step; ``before``: both before the expansion."""
+    """Pore and solution interpolated within a step; before: pore and solution before the expansion.
+    """
 
     pore: Pore
     solved: Solved
@@ -81,10 +82,11 @@ class InterpolatedState:
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """Result of one step: the new pore, pore and solution before the expansion, and the ledger.
+    """Result of one step.
 
-    within: interpolates the state to a time (h) within the step; departed: how aggregates left the
-    pore at its end.
+    pore: at the end; before: pore and solution after growth and before the expansion; ledger: mass
+    balance; remeshed: does the step make a new mesh?; iterations: of Newton's method; within:
+    interpolates the state to a time (h) within the step; departed: as :attr:`Report.departed`.
     """
 
     pore: Pore
@@ -100,9 +102,9 @@ class StepResult:
 class Compression:
     """The least elastic stretch of a run's free surface so far.
 
-    x, y: um, its place; time: h; aggregate: its name in messages. A surface may buckle after it
-    creases. Its stretch then rises again until the buckles meet, so the present stretch does not
-    show a fold.
+    x, y: um, its coordinates; time: h; aggregate: name of the aggregate in messages. A surface may
+    buckle after it creases. Its stretch then rises again until the buckles touch, so the present
+    stretch does not show a fold.
     """
 
     stretch: float = 1.0
@@ -117,11 +119,11 @@ class Compression:
 class RestartState:
     """Complete state from which a run restarts after a step.
 
-    pore: pore after the step, with the initial guess of its substrates; step_control: of the next
-    step; ledgers, remeshes, iterations: of the steps since the last Report; row: time (h) of that
-    Report, later than ``pore.time`` if it lies within the next step; compression: the least stretch
-    of the surface so far; missing: time (h) of a row within the next step that cannot be computed,
-    and the reason.
+    pore: after the step, with the initial guess of its substrates; step_control: of the next step;
+    ledgers, remeshes, iterations: of the steps since the last Report; row: time (h) of the last
+    Report, later than ``pore.time`` if this Report lies within the next step; compression: the
+    least stretch of the surface so far; missing: time (h) of a row within the next step that cannot
+    be computed, and the reason.
     """
 
     pore: Pore
@@ -148,7 +150,8 @@ def initial_report(state: RestartState, solved: Solved) -> Report:
 def contiguous(pore: Pore) -> Pore:
     """Return the same pore with contiguous arrays.
 
-    A sum over a strided view may differ in the last bit from that over its copy in a checkpoint.
+    The sum over a strided view and the sum over its copy in a checkpoint may differ in the last
+    bit.
     """
     state = pore.concentrations
     mesh = _contiguous_arrays(pore.mesh)
@@ -173,10 +176,10 @@ def _contiguous_arrays(data: Data) -> Data:
 
 @contextmanager
 def stopping(time: float, bonded: bool = False) -> Iterator[None]:
-    """Turn the failure of a step that starts at ``time`` (h) into a SimulationError.
+    """Raise SimulationError in place of the error of a step that starts at ``time`` (h).
 
-    bonded: whether the aggregate is bonded to the lower wall, for the advice in the message. Stage
-    errors, floating-point errors and lack of memory count as failures.
+    bonded: is the aggregate bonded to the lower wall? The advice in the message depends on it. The
+    replaced errors are StageError, FloatingPointError and MemoryError.
     """
     stopped = f"stopped in the step from t = {time:g} h"
     try:

@@ -1,12 +1,12 @@
-"""Steps as long as the growth allows (steps = "midpoint"): second order in time.
+"""Steps with error control by the midpoint rule (steps = "midpoint"), second order in time.
 
 The midpoint rule integrates (9)-(10) over a step with the rates of the shape half way. Euler's rule
-would use the rates at the start. ``numerics.tolerance`` bounds their difference, averaged over the
-aggregate, times the step. The error of the midpoint rule is of higher order; ``make bench``
-measures it for each tolerance. A step ends when the film between the aggregate and the opposite
-wall first becomes too thin (2.3.3), and at the times of the scene's tables. Rows and the end of the
-run do not change the steps. If a row cannot be interpolated, steps of its own lead to it. They are
-shortened and their elements are graded as in every step.
+would use the rates at the start. ``numerics.tolerance`` bounds the mean difference of these rates
+over the aggregate, times the length of the step. The error of the midpoint rule is of higher order;
+``make bench`` measures it for each tolerance. A step ends when the film between the aggregate and
+the opposite wall first becomes too thin (2.3.3), and at the times of the scene's tables. Rows and
+the end of the run do not change the steps. If a row cannot be interpolated, separate steps lead to
+it. These steps are shortened and graded like all others.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ from repro.scene import Growth, needed
 
 #: Length of the first attempted step over growth.time_step.
 FIRST = 8.0
-#: Least number of rows after t = 0 without ``output.times``.
+#: Least number of rows after t = 0 if the scene has no ``output.times``.
 LEAST = 24
-#: Least film after a step that makes contact, over the minimum film.
+#: Least film at the end of a step that makes the first contact, over growth.minimum_film.
 LANDED = 0.999
 
 
 def rows(growth: Growth) -> tuple[float, ...]:
     """Times (h) of rows besides the ends of steps: growth.end, and multiples of an interval.
 
-    The interval is growth.time_step times a power of two (1/4, 1/2, 1, 2 ...), the largest one with
-    at least LEAST rows.
+    The interval is growth.time_step times a power of two (1/4, 1/2, 1, 2 ...). It is the longest
+    interval that gives at least LEAST rows.
     """
     if growth.end <= SAME_TIME:
         return ()
@@ -63,7 +63,7 @@ def rows(growth: Growth) -> tuple[float, ...]:
 
 def _advance(stages: Stages, previous: Pore, solved: Solved,
              planned: StepControl) -> tuple[StepResult, Solved, StepControl]:
-    """Advance one full step, or a step to growth.end if that lies within the full step.
+    """Advance one full step, or a step to growth.end if growth.end lies within the full step.
 
     The length of the full step does not depend on growth.end or on the requested rows.
     """
@@ -78,7 +78,7 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
 
 def _row(stages: Stages, previous: Pore, solved: Solved, control: StepControl,
          within: Callable[[float], InterpolatedState], time: float) -> InterpolatedState:
-    """The state at a time (h) within a step. If it cannot be interpolated, steps lead to it."""
+    """The state at a time (h) within a step, interpolated, or by separate steps if that fails."""
     try:
         return within(time)
     except (StageError, FloatingPointError):
@@ -114,13 +114,15 @@ def _cut(stages: Stages, previous: Pore, solved: Solved,
 
 def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepControl,
                corner: float) -> tuple[StepResult, Solved, StepControl]:
-    """Shorten a step until it is accepted. It ends at ``corner`` (h) or before.
+    """Shorten a step until it is accepted. The step ends at ``corner`` (h) or before.
 
-    Failures shorten the step to 1/2, 1/8, 1/128 ... of its length, down to the shortest one: each
-    factor is the square of the last. Close to a fold every length fails, and few are tried. If a
-    step passes an end of the run, it is halved instead, so that the last state is close to the end.
+    Failures shorten the step to 1/2, 1/8, 1/128 ... of its length, down to the shortest length:
+    each factor is the square of the previous one. Close to a fold every length fails, and so only
+    few are tried. If a step passes an end of the run, it is halved instead, so that the last state
+    is close to this end.
 
-    Returns the step, the solution after it, and the next step control.
+    Returns the step, the solution after it, and the next step control. Raises StageError,
+    FloatingPointError or RunEnd if the shortest step fails.
     """
     tolerance = stages.tolerance
     time_step = stages.growth.time_step
@@ -139,7 +141,7 @@ def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepCont
             if trial.step:
                 end = _end_of(previous, duration, corner)
                 step, after = _solve_after(stages, _end_at(trial.step, end))
-                if trial.gaps is not None:  # only contact shortened the step
+                if trial.gaps is not None:  # contact shortened the step, not the error
                     return step, after, control
                 attempted = replace(control, length=length)
                 following = next_step_size(attempted, duration, estimate, tolerance)
@@ -171,9 +173,9 @@ def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepCont
 
 
 def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | None:
-    """Halve the elements at the aggregate at the start of a step, and solve there.
+    """Halve the elements at the aggregate at the start of a step, and solve on the new mesh.
 
-    None if they have been halved as often as allowed.
+    Returns None if they have been halved as often as allowed.
     """
     finer = stages.grading.finer(previous)
     if finer is None:
@@ -183,7 +185,10 @@ def _halve_elements(stages: Stages, previous: Pore) -> tuple[Pore, Solved] | Non
 
 
 def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
-    """Solve after a step, before a jump. A sharp front gets a graded mesh if it needs one."""
+    """Solve after a step, just before a jump of the tables at its end.
+
+    If a front of the substrates is too sharp for the mesh, a graded mesh replaces it.
+    """
     before = before_jump(stages.tables, step.pore)
     after, solved = stages.grading.solve(before)
     if after is not before:
@@ -193,9 +198,9 @@ def _solve_after(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
 
 
 def _part_to_contact(before: float, after: float, film: float) -> float:
-    """Part of a step after which the gap (um) is just under the film (um).
+    """Fraction of a step after which the gap (um) is just below the least film (um).
 
-    before, after: gaps at the start and the end of the step.
+    before, after: gaps (um) at the start and the end of the step.
     """
     aim = 0.5 * (1 + LANDED) * film
     part = (before - aim) / (before - after) if after < before else 0.0
@@ -203,7 +208,7 @@ def _part_to_contact(before: float, after: float, film: float) -> float:
 
 
 def _end_of(previous: Pore, duration: float, corner: float) -> float:
-    """Time (h) of a step's end; exactly that of the scene's tables if the step ends there."""
+    """Time (h) of a step's end; exactly ``corner`` (h) if the step ends there."""
     end = previous.time + duration
     return corner if abs(corner - end) <= SAME_TIME else end
 

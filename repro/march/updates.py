@@ -1,8 +1,8 @@
-"""The sequential coupling (section 2): flow, substrates, biomass, shape, moved mesh, every 12 min.
+"""Sequential coupling (section 2): flow, substrates, biomass, shape and mesh, every 12 min.
 
 One step integrates (9)-(10) in the present geometry, increases theta by (28)-(29), solves for the
-new equilibrium of the aggregate, closes films that are too thin (2.3.3), and moves the mesh (35) or
-replaces it by the paper's criteria (3.1, 3.5).
+new equilibrium of the aggregate, closes films that are too thin (2.3.3), and moves the mesh (35).
+The paper's criteria (3.1, 3.5) decide whether a new mesh replaces it.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.scene import Growth, Scene
 
-#: A time that differs from a multiple of growth.time_step by less than this fraction equals it.
+#: A time equals a multiple of growth.time_step if it differs by less than this part of
+#: growth.time_step.
 ON_GRID = 1e-3
 
 
 def schedule(scene: Scene) -> tuple[list[float], set[float]]:
-    """Times (h) at which steps end, and times that are reported; t = 0 first.
+    """Times (h) at which steps end, from t = 0 on, and times (h) that are reported.
 
-    growth.end cuts the last step. A reported time between two steps cuts no step.
+    growth.end cuts the last step. A reported time within a step does not cut it.
     """
     if scene.growth is None:
         return [0.0], {0.0}
@@ -46,9 +47,9 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
 def next_time(growth: Growth, time: float, corner: float) -> float:
     """Time (h) at which the step after ``time`` ends.
 
-    It is the earliest of the next multiple of growth.time_step, the next time of the scene's
-    tables, ``corner``, and growth.end. Within SAME_TIME, a table's time replaces the multiple, and
-    growth.end replaces both.
+    It is the earliest of three times: the next multiple of growth.time_step, the next time of the
+    scene's tables (``corner``), and growth.end. If two of them differ by less than SAME_TIME,
+    ``corner`` replaces the multiple, and growth.end replaces both.
     """
     count = math.floor(time / growth.time_step + ON_GRID) + 1
     update = round(count * growth.time_step, 9)
@@ -61,7 +62,7 @@ def next_time(growth: Growth, time: float, corner: float) -> float:
 
 def _advance(stages: Stages, previous: Pore, solved: Solved,
              control: StepControl) -> tuple[StepResult, Solved, StepControl]:
-    """Make the step to the next update, or to growth.end; half of it while it passes an end."""
+    """Make the step to the next update or to growth.end; halve it until it passes no end."""
     time = next_time(stages.growth, previous.time, stages.tables.corner(previous.time))
     while True:
         try:
@@ -74,7 +75,7 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
 
 def _cut(stages: Stages, previous: Pore, solved: Solved,
          time: float) -> tuple[StepResult, Solved]:
-    """Make a step to a time (h). The solution after it is that before a jump of the tables."""
+    """Make a step to a time (h), and solve at its end, just before a jump of the tables there."""
     advanced = step(stages, previous, solved, time - previous.time)
     after = contiguous(replace(advanced.pore, time=time))
     solved = stages.solver.solve(before_jump(stages.tables, after))
@@ -82,7 +83,7 @@ def _cut(stages: Stages, previous: Pore, solved: Solved,
 
 
 def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) -> InterpolatedState:
-    """Interpolate to a time (h) within a step, by a shorter step from its start."""
+    """The state at a time (h) within a step, by a shorter step from its start."""
     shorter = step(stages, previous, solved, time - previous.time)
     after = replace(shorter.pore, time=time)
     return InterpolatedState(after, stages.solver.solve(after), shorter.before)
@@ -109,7 +110,7 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
 def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:
     """Compute the shape of the grown aggregate.
 
-    Raises GrowthError if it passes the opposite wall within the step.
+    Raises GrowthError if the aggregate passes the opposite wall within the step.
     """
     try:
         return stages.expand(previous, grown)
@@ -121,10 +122,10 @@ def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:
 
 
 def _solve_midway(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Solved:
-    """Solve at the start of a step with the supplies and the drive of its middle.
+    """Solve in the shape at the start of a step, with the supplies and the drive at its middle.
 
-    If no table of the scene changes in the step, this is ``solved``. Stored substrates stay those
-    of the start.
+    If no table of the scene changes in between, the result is ``solved``. If the transport stores
+    substrates, the concentrations stay those of the start.
     """
     middle = previous.time + duration / 2
     if stages.tables.same(previous.time, middle):

@@ -1,2 +1,2 @@
-"""The paper's model: flow, kinetics, substrates, growth, contact, mesh motion, traction, and the
-state of the pore that they work on."""
+"""The paper's model: flow, kinetics, substrates, growth, contact, mesh motion and traction, and the
+state of the pore."""

@@ -1,26 +1,27 @@
 """Wall tractions, fluid forces and the largest tensile stress of an aggregate (section 5).
 
 The equilibrium (22), tested with the nodal functions, gives the forces of the walls on the
-aggregate: at a node on a wall, the force of the stress minus that of the fluid. They are the
-consistent nodal forces of a traction t. On a bonded wall it has both directions. On a sliding wall
-it acts across the wall, and a shear keeps each contact surface in place
+aggregate. At a node on a wall, this force is the force of the stress minus the force of the fluid.
+The nodal forces are consistent with a traction t. On a bonded wall t has both components. On a
+sliding wall t is normal to the wall, and a shear keeps each contact surface in place
 (:mod:`repro.model.support`). At a point x of a contact surface, the wall bears
 
     ((max(pull, 0))^2 + shear^2)^(1/2)
 
-with the means of the pull, from the aggregate into the wall, and of the shear over a length of W /
-20 around x. The stress at a contact line may be singular. A mean over a length converges as the
-mesh is refined. The tensile stress is a weighted mean over the points within W / 20 of a node.
+with means over a length of W / 20 around x. The pull acts from the aggregate into the wall. The
+stress at a contact line may be singular, but a mean over a length converges as the mesh is refined.
+The tensile stress is a weighted mean over the points within W / 20 of a node.
 
-A new mesh takes over a shape that was in equilibrium on the old mesh. Its stresses at contact lines
-then err by up to 185 % (``growth-gold-contact``), and elements that are longer than the means do
-not see the singularity at the edge of a bonded wall: tractions erred by 30 to 55 %
-(``growth-gold-bonded``). So both stresses belong to an equilibrium of their own. Its triangles are
-small beside all contact lines. Its contact surfaces are those of the run, and the water around it
-exerts its forces. The run keeps its mesh.
+The stresses in the run's own mesh are not accurate enough. A new mesh takes over a shape that was
+in equilibrium on the old mesh, so stresses at contact lines err by up to 185 %
+(``growth-gold-contact``). Elements longer than the averaging length do not resolve the singularity
+at the edge of a bonded wall: tractions err by 30 to 55 % (``growth-gold-bonded``). Therefore both
+stresses are computed in a separate equilibrium (:func:`at_rest`). It has small triangles beside all
+contact lines, the contact surfaces of the run, and the forces of the water around it. The run keeps
+its mesh.
 
-Without ``growth.fluid_forces`` the equilibrium has no forces of the fluid, and walls bear the
-stress of growth alone.
+Without ``growth.fluid_forces`` the equilibrium has no fluid forces, and walls bear the stress of
+growth alone.
 """
 
 from __future__ import annotations
@@ -47,12 +48,12 @@ from repro.model.solving import Solved
 from repro.scene import Flow as Drive
 from repro.scene import Growth, Numerics, Scene, at_time, needed
 
-#: The length of the means, over the pore's width.
+#: Averaging length over the pore's width.
 LENGTH = 1 / 20
-#: Length of the means over that of the triangles beside contact lines. On bonded walls tractions
-#: err by 0.7, 0.5 and 0.35 % with 8, 11 and 16 of them (``growth-gold-bonded``).
+#: Averaging length over the size of the triangles beside contact lines. On bonded walls tractions
+#: err by 0.7, 0.5 and 0.35 % with 8, 11 and 16 triangles (``growth-gold-bonded``).
 ELEMENTS_ALONG = 8
-#: Parts of an arc on a wall, for the means of its traction.
+#: Number of parts of an edge on a wall, to average its traction.
 PARTS = 64
 
 
@@ -88,8 +89,11 @@ class Peak:
 
 @dataclass(frozen=True)
 class Load:
-    """Force x, y (MPa um) of the fluid on the aggregate, and its moment about the middle of the
-    contact with the wall of its seed, counterclockwise (MPa um2); per depth."""
+    """Force of the fluid on one aggregate, per depth.
+
+    x, y: MPa um; moment: MPa um2, counterclockwise, about the middle of the contact surface with
+    the wall of its seed.
+    """
 
     x: float
     y: float
@@ -111,8 +115,10 @@ def _stress(loading: Loading, pore: Pore, solid: Solid, region: Region) -> np.nd
 
 
 def fluid_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
-    """(n, 2) MPa um, forces of the water on the aggregates' nodes, without those on the wall beside
-    a contact line."""
+    """(n, 2) MPa um, forces of the water on the aggregates' nodes.
+
+    They exclude the force of the water on the wall beside a contact line.
+    """
     drive = at_time(needed(loading.drive, "[flow]"), pore.time)
     water = needed(solved.flow, "a solution of the flow")
     of_head = traction.on_aggregate(pore.space, water, drive, loading.interface)
@@ -122,10 +128,10 @@ def fluid_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
 
 
 def _beside_contact(pore: Pore, water: Flow) -> np.ndarray:
-    """(N, 2) um2 of head: nodal forces of the fluid's wall edges that end at contact lines.
+    """(N, 2) um2 of head: forces of the water on wall edges that end at a contact line.
 
-    The nodal forces of the fluid's triangles include them. Only the pressure counts, because the
-    water in this corner is at rest.
+    The nodal forces of the fluid's triangles include these forces. They are forces of the pressure
+    alone, because the water in this corner is at rest.
     """
     mesh = pore.mesh
     forces = np.zeros_like(mesh.points)
@@ -165,7 +171,7 @@ def _load(mesh: Mesh, outline: Outline, region: Region, forces: np.ndarray) -> L
 def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
     """(n, 2) MPa um, forces of the walls on the aggregates' nodes.
 
-    At the other nodes they are the defect of the equilibrium.
+    At nodes off the walls the value is the residual of the equilibrium.
     """
     mesh = pore.mesh
     nodal = np.zeros_like(mesh.points)
@@ -180,10 +186,10 @@ def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
 
 @lru_cache(maxsize=1)
 def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]:
-    """The pore with its aggregates in equilibrium on the mesh of their stresses, and the solution
-    with the flow on that mesh if its forces count.
+    """The pore with its aggregates in equilibrium on a mesh with small triangles at contact lines.
 
-    Contact surfaces stay. Raises GrowthError if there is no equilibrium.
+    Also returns the solution. With fluid forces it contains the flow on this mesh. Contact surfaces
+    stay the same. Raises GrowthError if there is no equilibrium.
     """
     if not pore.bodies:
         return pore, solved
@@ -193,7 +199,8 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
     rest, _ = with_finer_lines(pore, lines, size, GRADATION)
     forces = None
     if loading.growth.has_fluid_forces:
-        # The solution's velocity drives this flow. At a jump the scene has only the head after it.
+        # The mean velocity of the solution drives this flow: at a jump, the scene gives only the
+        # head after the jump.
         driven = replace(at_time(needed(loading.drive, "[flow]"), pore.time),
                          mean_velocity=solved.mean_velocity)
         water = flow.solve(rest.space, driven, loading.length, interface=loading.interface)
@@ -216,7 +223,7 @@ def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
 
 @lru_cache(maxsize=1)
 def wall_peaks(loading: Loading, pore: Pore, solved: Solved) -> tuple[Peak, ...]:
-    """Largest mean stress that a wall bears from each aggregate in equilibrium."""
+    """For each aggregate, the largest mean stress that a wall bears in equilibrium."""
     rest, around = at_rest(loading, pore, solved)
     forces = rest.mesh.from_body(wall_forces(loading, rest, around))
     peaks = []
@@ -245,17 +252,18 @@ def _peak_on(pore: Pore, outline: Outline, region: Region, wall: Wall, forces: n
 
 @dataclass(frozen=True, eq=False)
 class _Surface:
-    """A contact surface: x (N,) um of a mesh's nodes; nodes (e, 2 or 3) of its edges, along x."""
+    """A contact surface. x: (N,) um, of the mesh's nodes; nodes: (e, 2 or 3) of each edge, along x.
+    """
 
     x: np.ndarray
     nodes: np.ndarray
 
     def _at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(s, k) functions of an edge's nodes at s in [0, 1], and their derivatives."""
+        """(p, k) shape functions of an edge's k nodes at s (p,) in [0, 1], and derivatives."""
         return edge_functions(self.nodes.shape[1], s)
 
     def density(self, forces: np.ndarray) -> np.ndarray:
-        """(N,) traction at the nodes of the surface, from nodal forces (N,) per depth."""
+        """(N,) MPa, traction at the nodes of the surface, from nodal forces (N,) MPa um."""
         points, weights = np.polynomial.legendre.leggauss(4)
         values, slopes = self._at((points + 1) / 2)
         dx = self.x[self.nodes] @ slopes.T * (weights / 2)
@@ -269,12 +277,13 @@ class _Surface:
         return density
 
     def _places(self) -> np.ndarray:
-        """(e PARTS + 1,) um, places along the surface."""
+        """(e PARTS + 1,) um, x of points along the surface."""
         values, _ = self._at(np.arange(PARTS) / PARTS)
         return np.append((self.x[self.nodes] @ values.T).ravel(), self.x[self.nodes[-1, -1]])
 
     def _windows(self, width: float) -> tuple[np.ndarray, float]:
-        """Starts (w,) um and length (um) of the means; a shorter surface has one mean."""
+        """Starts (w,) um and length (um) of the averaging intervals; a short surface has only one.
+        """
         places = self._places()
         length = min(LENGTH * width, places[-1] - places[0])
         starts = np.concatenate([places, places - length])
@@ -282,12 +291,12 @@ class _Surface:
         return np.append(starts[inside], places[0]), length
 
     def middles(self, width: float) -> np.ndarray:
-        """(w,) um, middles of the means."""
+        """(w,) um, middles of the averaging intervals."""
         starts, length = self._windows(width)
         return starts + length / 2
 
     def means(self, density: np.ndarray, width: float) -> np.ndarray:
-        """(w,) means of a traction (N,). Simpson's rule integrates each part of an edge exactly."""
+        """(w,) means of a traction (N,), exact by Simpson's rule on each part of an edge."""
         s = np.arange(2 * PARTS + 1) / (2 * PARTS)
         values, slopes = self._at(s)
         along = (density[self.nodes] @ values.T) * (self.x[self.nodes] @ slopes.T)
@@ -302,9 +311,9 @@ class _Surface:
 def tensile_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:
     """Largest principal value of the mean stress around a node in equilibrium.
 
-    The mean has the weight 1 - (d / L)^2 at a distance d < L = W / 20 from the node. It is taken
-    over the points where growth is integrated. On a mesh without a point so near to a node, L is
-    twice the least distance.
+    The mean is over the points where growth is integrated, with the weight 1 - (d / L)^2 at a
+    distance d < L = W / 20 from the node. If no point is within W / 40 of any node, L is twice the
+    least distance.
     """
     return max(tensile_peaks(loading, pore, solved), key=lambda peak: peak.value)
 

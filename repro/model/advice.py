@@ -1,4 +1,7 @@
-"""The keys of a scene that help against errors of the finite elements, which know no scene."""
+"""Advice for errors of the finite elements: the keys of a scene that help.
+
+:mod:`repro.fem` does not know the scene, so its messages cannot name the keys.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ ADVICE: dict[type[StageError], str] = {
 }
 
 
-#: On a bonded wall, where strain at contact lines is singular.
+#: Advice on a bonded wall, where strain at contact lines is singular.
 BONDED: dict[type[StageError], str] = {
     OriginFolded: "; no setting helps reliably: the strain at the contact lines of a bonded wall "
                   'is singular, and a finer mesh may stop the run sooner; growth.wall = "sliding" '
@@ -21,9 +24,9 @@ BONDED: dict[type[StageError], str] = {
 
 
 def with_advice(error: StageError, bonded: bool = False) -> str:
-    """The message of an error with the keys of a scene that help against it.
+    """The message of an error, with advice about the scene's keys.
 
-    bonded: whether the aggregate is bonded to the lower wall.
+    bonded: is the aggregate bonded to the lower wall?
     """
     advice = ADVICE | BONDED if bonded else ADVICE
     return f"{error}{advice.get(type(error), '')}"

@@ -1,14 +1,14 @@
 """Active and inert biomass, X_A and X_I ((9)-(10), (28)-(34)): masses at the reaction's points.
 
 A mass stays with its material when the aggregate changes its shape. At the nodes of linear elements
-this is (34), X'_i = X_i S_i / S'_i with the lumped areas S; quadratic elements apply it at
-every quadrature point. Densities are masses over the points' weights (um2). Uptake and growth use
-the same masses at the same points, so that
+this is (34), X'_i = X_i S_i / S'_i with the lumped areas S. Quadratic elements apply (34) at every
+quadrature point. A density is a mass over the weight (um2) of its point. Uptake and growth use the
+same masses at the same points, so that
 
     biomass made = Y donor - (acceptor - F donor) / d_c
 
-holds at every point, and for the aggregate. A new mesh gets the masses by a transfer
-that conserves their sum, or by the paper's interpolation, which does not [E8].
+is valid at every point, and for the aggregate. On a new mesh the transfer of masses conserves their
+sum, except for the paper's interpolation [E8].
 """
 
 from __future__ import annotations
@@ -36,14 +36,17 @@ Amounts: TypeAlias = tuple[np.ndarray, ...]
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Growth of active biomass F3 / X_A and gain of inert biomass F4 / X_A, (r, q) 1/h."""
+    """Rates per active biomass, (r, q) 1/h.
+
+    growth: F3 / X_A, of active biomass; remains: F4 / X_A, of inert biomass.
+    """
 
     growth: np.ndarray
     remains: np.ndarray
 
     @property
     def total(self) -> np.ndarray:
-        """Rate of active and inert biomass together, per active biomass."""
+        """(r, q) 1/h, rate of active plus inert biomass, per active biomass."""
         return self.growth + self.remains
 
 
@@ -62,8 +65,10 @@ def grow(pore: Pore, rates: Rates, duration: float) -> Pore:
 
 
 def change(first: Rates, second: Rates, weight: np.ndarray) -> float:
-    """Mean difference (1/h) of two rates over the aggregates, zero without any; weight: (r, q) of
-    the points."""
+    """Mean difference (1/h) of two rates over the aggregates; zero without aggregates.
+
+    weight: (r, q) um2, of the points.
+    """
     if not weight.size:
         return 0.0
     return float(np.vdot(weight, np.abs(second.total - first.total)) / weight.sum())
@@ -76,14 +81,15 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
     Parameters
     ----------
     method : {"projection", "interpolation", "shares"}
-        Transfer of the scheme: of densities at the nodes of straight triangles, or of shares.
+        Transfer of the scheme: of densities at the nodes of straight triangles, or of fractions of
+        the biomass.
     old, new : Space
     at : Located
         The nodes of the new mesh's aggregate in the old mesh.
     amounts : tuple of (r, q) arrays
-        Active and inert masses, and other amounts of the same material, um2 mg/L.
+        Active and inert masses, then other amounts in the biomass, um2 mg/L.
     masses : (r, q) float
-        Biomass at the new mesh's points if its density were X_m everywhere, um2 mg/L.
+        Biomass at the new mesh's points at the density X_m, um2 mg/L.
 
     Returns
     -------
@@ -92,22 +98,22 @@ def transfer_amounts(method: str, old: Space, new: Space, at: Located, amounts: 
 
     Notes
     -----
-    With shares the new mesh has ``masses``, which removes the error of J = theta within a triangle.
-    Each amount keeps its share of the biomass, and its sum in each aggregate.
+    With "shares" the biomass on the new mesh is ``masses``. This removes the error of J = theta
+    within a triangle. Each amount keeps its fraction of the biomass, and its sum in each aggregate.
     """
     return TRANSFERS[method](old, new, at, amounts, masses)
 
 
 def _inside(old: Space, new: Space, at: Located, amounts: Amounts, masses: np.ndarray) -> Amounts:
-    """Transfer the shares of the biomass to smaller aggregates within the old ones, whose density
-    is X_m everywhere."""
+    """Transfer the fraction of inert biomass to smaller aggregates within the old ones. The new
+    biomass is ``masses``."""
     inert = _shares(old, new, at, amounts[:2])[0] * masses
     return masses - inert, inert
 
 
 def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts,
                masses: np.ndarray) -> Amounts:
-    """Transfer the shares of the biomass; the new mesh has ``masses``."""
+    """Transfer fractions of the biomass; the biomass on the new mesh is ``masses``."""
     inside = _shares(old, new, at, amounts)
     transferred = [np.zeros_like(masses) for _ in amounts]
     for before, after in zip(old.mesh.regions, new.mesh.regions):
@@ -123,8 +129,10 @@ def _by_shares(old: Space, new: Space, at: Located, amounts: Amounts,
 
 
 def _shares(old: Space, new: Space, at: Located, amounts: Amounts) -> list[np.ndarray]:
-    """Interpolate shares of the biomass to the points of the new mesh: one (r, q) for the inert
-    mass, and one for each further amount."""
+    """Interpolate fractions of the biomass to the points of the new mesh.
+
+    Returns one (r, q) for the inert mass, and one for each further amount.
+    """
     total = amounts[0] + amounts[1]
     shares = np.column_stack([old.integration.to_nodes(amount / total)
                               for amount in amounts[1:]])
@@ -134,8 +142,10 @@ def _shares(old: Space, new: Space, at: Located, amounts: Amounts) -> list[np.nd
 
 def _by_densities(carried: Callable[..., np.ndarray], old: Space, new: Space, at: Located,
                   amounts: Amounts, masses: np.ndarray) -> Amounts:
-    """Transfer amounts as densities at the nodes of straight triangles, by a function of
-    :mod:`repro.fem.transfer`."""
+    """Transfer amounts as densities at the nodes of straight triangles.
+
+    carried: function of :mod:`repro.fem.transfer`.
+    """
     old_nodes = old.reaction.cells[:, 0]
     new_nodes = new.reaction.cells[:, 0]
     densities = np.column_stack([amount[:, 0] / old.reaction.dx[:, 0] for amount in amounts])
@@ -152,14 +162,16 @@ def _scaled(amount: np.ndarray, total: float) -> np.ndarray:
 
 
 def _conserved(share: np.ndarray, weight: np.ndarray, total: float) -> np.ndarray:
-    """Shares (r, q) with the weighted sum ``total``: a multiple of share (1 - share) is added, so
-    that they stay between zero and one."""
+    """Fractions (r, q) corrected to the weighted sum ``total``.
+
+    The correction is a multiple of share (1 - share), so that fractions stay between zero and one.
+    """
     room = float(np.vdot(weight, share * (1 - share)))
     deficit = total - float(np.vdot(weight, share))
     return share + deficit / room * share * (1 - share) if abs(deficit) < room else share
 
 
-#: By the scheme's transfer.
+#: {transfer of the scheme: function}; "inside" is for erosion.
 TRANSFERS: dict[str, Callable[..., Amounts]] = {
     "projection": partial(_by_densities, transfer.project),
     "interpolation": partial(_by_densities, transfer.interpolated),

@@ -1,8 +1,9 @@
 """One aggregate of a pore: its contact, its biomass, its expansion and its reference.
 
-Places of nodes and pressures are fields of the mesh, which a pore has once. The aggregate's nodes,
-triangles and loop are those of its region in the mesh (:class:`repro.fem.mesh.Region`). Both lists
-have the same order.
+All aggregates of a pore share one mesh. The positions of nodes and the pressure are fields on this
+mesh, not data of a body. The nodes, triangles and loop of a body are those of its region
+(:class:`repro.fem.mesh.Region`). A pore's list of bodies and its mesh's list of regions have the
+same order.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ from repro.model.solid import Solid
 class Body:
     """One aggregate at one time.
 
-    wall: (M,) contact of each node of its loop; fixed: (M,) its x is constrained; active, inert:
-    X_A, X_I, (r, q) um2 mg/L at its points of the reaction; theta: (t, q) expansion since t = 0 in
-    its triangles; solid: the aggregate as it was at t = 0; configuration: from which strain counts;
-    line_speeds: (2, 2) um/h, speeds of the contact lines, None if unknown. A row has the lines of
-    one wall, the lower wall first: the line where a free surface begins along the loop, then the
-    line where one ends. seat: where its seed sat; name: in messages. origin_known: False once
-    present places have replaced places at t = 0 that fold. This happens only if strain does not
-    count from t = 0.
+    wall: (M,) wall that each node of its loop touches, FREE or WELD; fixed: (M,) True where x is
+    constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at its points of the reaction; theta:
+    (t, q) expansion since t = 0 in its triangles; solid: the aggregate at t = 0; configuration:
+    the one from which strain counts; line_speeds: (2, 2) um/h, speeds of the contact lines, None if
+    unknown. Each row is one wall, the lower wall first. Its first line is where a free surface
+    begins along the loop, its second line where a free surface ends. seat: position of its seed;
+    name: in messages. origin_known: False after present positions have replaced positions at t = 0
+    that fold. This happens only if strain does not count from t = 0.
     """
 
     wall: np.ndarray
@@ -51,12 +52,13 @@ class Body:
 
     @property
     def unstrained(self) -> np.ndarray:
-        """(n, 2) um, its nodes in the shape from which strain counts."""
+        """(n, 2) um, positions of its nodes in the configuration from which strain counts."""
         return self.configuration.unstrained(self.solid)
 
     @property
     def strained(self) -> tuple[Solid, np.ndarray]:
-        """The aggregate in that shape, and its expansion (t, q) since then."""
+        """The aggregate in the configuration from which strain counts, and the expansion (t, q)
+        since then."""
         return self.configuration.strained(self.solid, self.theta)
 
     @property
@@ -66,5 +68,5 @@ class Body:
 
     @property
     def spans(self) -> bool:
-        """Does it touch both walls, or its own one and another aggregate?"""
+        """Does it touch both walls, or the wall of its seed and another aggregate?"""
         return bool(np.ptp(self.wall[self.wall != FREE]) > 0)

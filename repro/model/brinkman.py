@@ -1,20 +1,20 @@
 """A permeable aggregate instead of a viscous one: Brinkman's drag, for quadratic velocities.
 
-The biomass, of permeability k, adds its drag ``(u / k, v)`` to a(u, v) of :mod:`repro.model.flow`.
-Along the interface and the walls the velocity changes within layers of thickness sqrt(k). A
-triangle of biomass resolves its layer where its longest edge h is at most ``ACROSS`` sqrt(k). This
-module solves Brinkman's equation unchanged there. In every larger triangle it widens the layer:
+Biomass of permeability k adds its drag ``(u / k, v)`` to a(u, v) of :mod:`repro.model.flow`. Along
+the interface and the walls the velocity changes within layers of thickness sqrt(k). A triangle of
+biomass resolves the layer if its longest edge h is at most ``ACROSS`` sqrt(k). There this module
+solves Brinkman's equation unchanged. In every larger triangle it widens the layer:
 
-- **Thickness.** The viscosity over that of water becomes nu_r = d^2 / k, so that the layer is
+- **Thickness.** The relative viscosity becomes nu_r = d^2 / k, so that the layer is
   d = h / ``ACROSS`` thick. Darcy's flow u = -k grad p does not change: div u = 0 makes every
-  component harmonic, and nu_r lap u = 0. Head loss and flux through the aggregate stay those of k.
-- **Walls.** A layer on a wall takes sqrt(k) U from the flow along the wall, with U the flow beyond
-  the layer; the widened one would take d U. Therefore the velocity slides on the wall against a
-  friction (b u_x, v_x) with b = d / (sqrt(k) (d - sqrt(k))), which restores sqrt(k) U. On a
-  contact line, which belongs to the fluid too, u = 0.
+  component harmonic, and nu_r lap u = 0. Head loss and flux through the aggregate stay the same.
+- **Walls.** Let U be the velocity beyond a layer on a wall. The layer reduces the flux along the
+  wall by sqrt(k) U; the widened layer would reduce it by d U. Therefore the velocity slides on the
+  wall against a friction (b u_x, v_x) with b = d / (sqrt(k) (d - sqrt(k))), which restores
+  sqrt(k) U. Contact lines also belong to the fluid, so u = 0 there.
 
-Both limits are exact: where h falls, every triangle resolves its layer; where k falls, the velocity
-tends to one that does not depend on k.
+Both limits are exact. As h decreases, every triangle resolves its layer. As k decreases, the
+velocity tends to a limit that does not depend on k.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ import numpy as np
 from repro.fem import elements
 from repro.fem.space import Space
 
-#: Longest edge over the thickness of the layer. In one dimension a node overshoots where a
-#: quadratic element is more than 6.3 times as long as the layer is thick.
+#: Longest edge over the thickness of the layer. In one dimension a node overshoots if a quadratic
+#: element is longer than 6.3 times the thickness of the layer.
 ACROSS = 6.0
 
 
@@ -42,13 +42,13 @@ class Drag:
 
     @cached_property
     def thickness(self) -> np.ndarray:
-        """(T,) um, thickness d of the layer as each triangle represents it, at least sqrt(k)."""
+        """(T,) um, thickness d of the layer in each triangle, at least sqrt(k)."""
         longest = np.linalg.norm(self.velocity.mesh.sides, axis=2).max(axis=1)
         return np.maximum(np.sqrt(self.permeability), longest / ACROSS)
 
     @cached_property
     def widened(self) -> np.ndarray:
-        """(T,) True in biomass where the layer is thicker than sqrt(k)."""
+        """(T,) True for biomass triangles in which the layer is widened."""
         return self.velocity.mesh.biomass & (self.thickness > np.sqrt(self.permeability))
 
     @property
@@ -57,8 +57,11 @@ class Drag:
         return np.where(self.widened, self.thickness**2 / self.permeability, 1.0)
 
     def constrained(self, no_slip: np.ndarray) -> np.ndarray:
-        """(2n + m,) constrained unknowns: those of u = 0 on all walls, ``no_slip``, without u_x at
-        wall nodes that touch only widened triangles."""
+        """(2n + m,) constrained unknowns: ``no_slip`` without u_x at wall nodes whose triangles are
+        all widened.
+
+        no_slip: (2n + m,) constrained unknowns with u = 0 on the walls.
+        """
         dofs = self.velocity.dofs
         slides = np.zeros(len(no_slip), bool)
         slides[dofs.walls] = True
@@ -78,7 +81,7 @@ class Drag:
         return blocks
 
     def _friction(self) -> np.ndarray:
-        """(T, k, k) of (b u_x, v_x) over the walls under widened triangles."""
+        """(T, k, k) of (b u_x, v_x) on the wall sides of widened triangles."""
         velocity = self.velocity
         mesh = velocity.mesh
         blocks = np.zeros((len(mesh.cells), *2 * velocity.cells.shape[1:]))

@@ -1,9 +1,9 @@
-"""Closing by contact lines, which lie anywhere on the arcs of curved elements (2.3.3).
+"""Closing of films on curved elements: contact lines lie anywhere on an arc (2.3.3).
 
-The contact surfaces are the smallest ones that leave no film and no wedge too thin. In contact
-Newton's method (:mod:`repro.model.contact_newton`) solves for shape and lines at once. A search by
-whole equilibria (:class:`repro.model.contact_lines.Line`) begins the first contact, and takes over
-if Newton's method fails.
+The contact surfaces are the smallest ones that leave no film and no wedge too thin. If the
+aggregate already spans the pore, Newton's method (:mod:`repro.model.contact_newton`) solves for
+shape and lines at once. A search (:class:`repro.model.contact_lines.Line`) starts the first
+contact, and replaces Newton's method if that fails. Each trial of the search is an equilibrium.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ from repro.model.mechanics import (
 from repro.model.pore import Pore
 from repro.model.solid import Shape, material
 
-#: Largest number of times that contact lines go back after a trial that fails.
+#: Largest number of times that contact lines retreat after failed trials.
 RETREATS = 6
-#: Defect at which each part of theta except the last counts as reached.
+#: Accepted defect of Newton's method for all parts of theta except the last.
 PARTLY = 1e-3
-#: Clearances of the first contact at which Newton's method takes over from the search.
+#: In the first contact, Newton's method replaces the search if all clearances are below this.
 CLOSE_ENOUGH = 0.2
-#: Lengths of the first contact on both sides of the highest point, over the least film.
+#: Trial lengths of the first contact on each side of the nearest point, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
 
 @dataclass(eq=False)
 class ByLines(Closing):
-    """The closing on arcs. Each trial is an equilibrium with the lines at given advances, and
-    starts from the last one, extrapolated in the advance of the line that moves most.
+    """The closing on arcs.
 
-    iterations: of Newton's method so far.
+    Each trial is an equilibrium with the lines at given advances. It starts from the last trial,
+    extrapolated in the advance of the line that moves most. iterations: of Newton's method so far.
     """
 
     iterations: int = field(init=False, default=0)
@@ -66,7 +66,7 @@ class ByLines(Closing):
 
     @property
     def _advances(self) -> dict[tuple[int, int], float]:
-        """{(wall, direction): um} of the first trial of the aggregate's lines."""
+        """{(wall, direction): um}, advances of the aggregate's lines in the first trial."""
         number = self.grown.number
         return {key[1:]: length for key, length in self.search.advances.items() if key[0] == number}
 
@@ -92,7 +92,7 @@ class ByLines(Closing):
         return replace(shape, pore=rest, iterations=self.iterations, gaps=gaps)
 
     def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion) -> Expansion:
-        """Move lines until all are accepted, or until Newton's method settles a first contact."""
+        """Move lines until all are accepted, or until Newton's method solves a first contact."""
         settles = not self.grown.body.spans
         for _ in range(CONTACT_ROUNDS):
             outline = shape.pore.boundary
@@ -116,9 +116,10 @@ class ByLines(Closing):
         """The first contact of a shape with the nearest wall: walls (M,), contact lines, and the
         equilibrium with them.
 
-        Contact covers at least the least film's thickness on both sides of the nearest point,
-        because a force at a single point would indent an elastic body without limit. If the body
-        is too pointed to be flat over this length, contact covers half of it, or a quarter.
+        Contact extends at least one thickness of the least film on each side of the nearest point,
+        because a force at a single point would indent an elastic body without limit. If there is
+        then no equilibrium because the body is too pointed, contact extends half of this length, or
+        a quarter. Raises GrowthError if all lengths fail or if the tip is too thin.
         """
         film = self._rule.film
         outline = replace(self.grown.boundary, points=shape.position[self.grown.region.loop])
@@ -126,9 +127,9 @@ class ByLines(Closing):
         lengths = film * FIRST_LENGTHS
         width = _tip_width(outline, nearest, film * nearest.part)
         if width < 2 * lengths[-1]:
-            raise GrowthError(f"a tip comes into contact that is {width:.2g} um wide at a depth of "
-                              f"{film:.2g} um, the least film; the rule for films (2.3.3) does not "
-                              "describe so thin a tip, and no setting helps")
+            raise GrowthError(f"the tip that touches the wall is only {width:.2g} um wide at a "
+                              f"depth of {film:.2g} um, the least film; the rule for films (2.3.3) "
+                              "does not apply to this thin tip, and no setting helps")
         for length in lengths:
             wall, lines = _first_contact(outline, nearest, length)
             _place_lines(replace(self.grown.boundary, wall=wall), lines, self._advances)
@@ -139,10 +140,10 @@ class ByLines(Closing):
         raise failure
 
     def solve(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion:
-        """The equilibrium with walls (M,) of the grown pore's outline and advances of the lines.
+        """The equilibrium with walls (M,) of the grown pore's outline and the lines' advances.
 
-        If it fails, the lines retreat half way to an advance that was too short. Raises
-        GrowthError if that does not help.
+        If the equilibrium fails, the lines retreat half way to an advance that was too short.
+        Raises GrowthError or LinearError if this does not help.
         """
         for _ in range(RETREATS):
             try:
@@ -170,9 +171,8 @@ class ByLines(Closing):
     def settle(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion | None:
         """Equilibrium with walls (M,) of the grown pore's outline and lines at zero clearance.
 
-        Newton's method solves for shape and lines at once. If it fails, the result is None and the
-        lines stay unchanged. Theta changes to its target in parts, as in
-        :func:`growth.equilibrium`.
+        Newton's method solves for shape and lines at once. If it fails, the result is None, and the
+        lines do not change. Theta goes to its target in parts, as in :func:`growth.equilibrium`.
         """
         start = [line.advance for line in lines]
         grown = self.grown
@@ -199,7 +199,7 @@ class ByLines(Closing):
                          advances=self._lengths(wall, lines))
 
     def _lengths(self, wall: np.ndarray, lines: Sequence[Line]) -> Advances:
-        """{(number, wall, direction): um} by which lines have advanced."""
+        """{(number, wall, direction): um}, the advances of the lines."""
         outline = replace(self.grown.boundary, wall=wall)
         return {(self.grown.number, *line.key): contact_lines.to_length(outline, line)
                 for line in lines}
@@ -218,7 +218,7 @@ class ByLines(Closing):
                                                               np.ndarray | None]:
         """A grown pore with a contact, its division, and the forces on its nodes.
 
-        If the arcs are those of the last contact, its connections serve again.
+        If the same arcs are divided as in the last call, its connections are reused.
         """
         if not len(contact.arcs):
             return grown.with_body(wall=contact.wall), None, self.forces
@@ -236,9 +236,11 @@ class ByLines(Closing):
         return locked, division, loads[locked.region.nodes]
 
     def _guesses(self, advances: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Positions (N, 2) um and pressures from which a trial may start, the best ones first: the
-        last two shapes, extrapolated in the advance of the line that moves most, the last shape,
-        and the start."""
+        """Positions (N, 2) um and pressures (corners,) from which a trial may start, best first.
+
+        They are the last two shapes, extrapolated in the advance of the line that moves most; the
+        last shape; and the start.
+        """
         last, points, pressure = self._shapes[-1]
         before, points_before, pressure_before = self._shapes[0]
         if len(self._shapes) == 2 and len(before) == len(advances):
@@ -254,8 +256,8 @@ class ByLines(Closing):
     def _first(self, locked: Pore, division: Division | None, advances: np.ndarray) -> Pore:
         """The pore from which a trial starts: the best guess in which no triangle is turned over.
 
-        A divided arc may have a kink where its contact begins. The undivided arc rounds it off,
-        which can turn a triangle over.
+        A divided arc may have a kink where its contact begins. The undivided arc smooths the kink.
+        This can turn a triangle over.
         """
         for points, pressure in self._guesses(advances):
             if division is not None:
@@ -268,8 +270,7 @@ class ByLines(Closing):
 
 def _place_lines(outline: Outline, lines: Sequence[Line],
                  advances: Mapping[tuple[int, int], float]) -> None:
-    """Start each contact line at its advance in {(wall, direction): um}, or at its least advance if
-    that is larger."""
+    """Set each line's advance from {(wall, direction): um}, but at least to its least advance."""
     for line in lines:
         length = advances.get(line.key, 0.0)
         line.advance = max(line.least, contact_lines.to_arcs(outline, line, length))
@@ -278,7 +279,7 @@ def _place_lines(outline: Outline, lines: Sequence[Line],
 
 
 def _tip_width(outline: Outline, wall: Wall, depth: float) -> float:
-    """The width (um) of the aggregate at a depth (um) behind its point nearest to a wall."""
+    """Width (um) of the aggregate at a depth (um) behind the point that is nearest to a wall."""
     x = outline.points[:, 0]
     height = -wall.normal * outline.points[:, 1]
     tip = int(np.argmax(height))
@@ -293,8 +294,11 @@ def _tip_width(outline: Outline, wall: Wall, depth: float) -> float:
 
 def _first_contact(outline: Outline, nearest: Wall,
                    length: float) -> tuple[np.ndarray, list[Line]]:
-    """Walls (M,) after the corner next to the nearest point has joined a wall, and the contact
-    lines at a length (um) on both sides of that point."""
+    """Walls (M,) and contact lines of a first contact.
+
+    The corner next to the nearest point joins the wall. The lines are at a length (um) on each side
+    of the nearest point.
+    """
     x = outline.points[:, 0]
     _, tip = outline.nearest(nearest)
     arc = int(np.argmin((nearest.normal * outline.arcs(outline.points)[:, :, 1]).min(axis=1)))
@@ -321,8 +325,10 @@ def _parts(growing: np.ndarray) -> np.ndarray:
 
 def divided(grown: Pore, division: Division, contact: Contact,
             shape: Shape | None = None) -> Pore:
-    """The pore on the divided mesh, with the walls of a contact; shape: the aggregate's connections
-    there, if they are known."""
+    """The pore on the divided mesh, with the walls of a contact.
+
+    shape: connections of the aggregate on the divided mesh, if known.
+    """
     space = Space(division.mesh)
     table = grown.space.table
     body = grown.body

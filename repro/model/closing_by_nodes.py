@@ -1,7 +1,7 @@
-"""Closing by nodes (2.3.3), the paper's: on straight edges a node joins a wall or stays free.
+"""The paper's closing of films (2.3.3), on straight edges: a node joins a wall or stays free.
 
-After each equilibrium, the nodes at a film or a wedge that is too thin join the wall, and so do all
-nodes between them and the contact surface.
+After each equilibrium, nodes at a film or a wedge that is too thin join the wall. All nodes between
+them and the contact surface join too.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ class ByNodes(Closing):
 def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float) -> np.ndarray:
     """(M,) wall that each node must join next, or FREE (2.3.3).
 
-    A layer of fluid thinner than ``film`` to a wall without contact closes, and so does a wedge of
-    fluid beside a contact surface whose angle is under ``angle``. Beside contact the gap must not
-    be less than the smaller of film and tan(angle) times the distance from the contact line.
-    Nodes between closing nodes close too, so that no fluid is trapped.
+    At a wall without contact, a film thinner than ``film`` (um) closes. Beside a contact surface, a
+    wedge with an angle below ``angle`` (rad) closes: the gap must be at least min(film, tan(angle)
+    d) at the distance d from the contact line. Nodes between closing nodes close too, so that no
+    fluid is trapped.
     """
     joins = np.full(len(outline.points), FREE)
     for wall in walls:
@@ -66,7 +66,10 @@ def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float) -> 
 
 def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float,
                  slope: float) -> np.ndarray:
-    """Free nodes from a contact line outwards, up to the last one too close to the wall."""
+    """Free nodes from a contact line outwards, up to the last node too close to the wall.
+
+    gap: (M,) um; step: 1 or -1, direction along the outline; slope: tangent of the least angle.
+    """
     count = len(gap)
     walk = (line + step * np.arange(1, count)) % count
     reach = np.flatnonzero(outline.wall[walk] != FREE)[0]
@@ -75,7 +78,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     x = outline.points[:, 0]
     gaps = gap[walk]
     apart = x[walk] - x[line]
-    # Free nodes end at the other line. If it is on the same wall, nodes belong to the nearer line.
+    # Free nodes end at another line. If that is on the same wall, nodes belong to the nearer line.
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if outline.wall[other] != outline.wall[line]:
         nearer = np.ones(len(walk), bool)

@@ -1,13 +1,14 @@
-"""The configuration from which strain counts: that of t = 0 (2.3), or the last shape (section 5).
+"""The configuration from which strain counts: the shape at t = 0 (2.3), or the last shape (section
+5).
 
-``growth.new_biomass`` chooses it; :func:`configuration_of` alone knows its words. Both classes have
+``growth.new_biomass`` selects it by :func:`configuration_of`. Both classes have
 
-    accumulates    True: strain adds up over the steps. Only then do folds and
-                   stresses have a meaning.
-    restarted      the configuration of a step from given positions (n, 2) um of the nodes
-    unstrained     (n, 2) um, the nodes of a solid in it
-    carried        the same on another mesh, to which a function carries positions (n, 2)
-    strained       the solid in it, and its expansion since then, from theta (t, q) since t = 0
+    accumulates    does strain add up over the steps? Folds and stresses have a meaning only then
+    restarted      the configuration at the start of a step, from positions (n, 2) um of the nodes
+    unstrained     (n, 2) um, positions of a solid's nodes in the configuration
+    carried        the configuration on another mesh, from a function that carries positions (n, 2)
+    strained       the solid in the configuration, and its expansion (t, q) since then, from theta
+                   (t, q) since t = 0
 """
 
 from __future__ import annotations
@@ -24,20 +25,20 @@ from repro.scene import Growth
 
 @dataclass(frozen=True)
 class FromStart:
-    """New biomass takes part in the strain since t = 0."""
+    """Strain counts from t = 0, for new biomass too."""
 
     accumulates = True
 
     def restarted(self, positions: np.ndarray) -> FromStart:
-        """This configuration."""
+        """The same configuration."""
         return self
 
     def unstrained(self, solid: Solid) -> np.ndarray:
-        """The solid's reference."""
+        """The reference of the solid."""
         return solid.reference
 
     def carried(self, carry: Callable[[np.ndarray], np.ndarray]) -> FromStart:
-        """The same, because the solid is carried."""
+        """The same configuration: the reference is carried with the solid."""
         return self
 
     def strained(self, solid: Solid, theta: np.ndarray) -> tuple[Solid, np.ndarray]:
@@ -47,13 +48,16 @@ class FromStart:
 
 @dataclass(frozen=True, eq=False)
 class FromPrevious:
-    """New biomass has no stress; positions: (n, 2) um, the nodes in the last shape."""
+    """New biomass has no stress: strain counts from the last shape.
+
+    positions: (n, 2) um, of the nodes in the last shape.
+    """
 
     positions: np.ndarray
     accumulates = False
 
     def restarted(self, positions: np.ndarray) -> FromPrevious:
-        """These positions."""
+        """The configuration with these positions."""
         return FromPrevious(positions)
 
     def unstrained(self, solid: Solid) -> np.ndarray:
@@ -65,8 +69,8 @@ class FromPrevious:
         return FromPrevious(carry(self.positions))
 
     def strained(self, solid: Solid, theta: np.ndarray) -> tuple[Solid, np.ndarray]:
-        """The expansion is theta / J. This removes the error of J = theta, so the area follows the
-        mass without drift."""
+        """The solid at the positions, and the expansion theta / J, with J of the last shape. The
+        quotient removes the error of J = theta, so the area follows the mass without drift."""
         return replace(solid, reference=self.positions), theta / solid.strained(self.positions).J
 
 

@@ -1,9 +1,9 @@
-"""The grown aggregate's new shape, with closing films and the fluid's forces (2.3.2, 2.3.3, 3.4).
+"""The grown aggregate's new shape, with closing films and fluid forces (2.3.2, 2.3.3, 3.4).
 
 A film of fluid closes if it is thinner than the least film. A wedge beside a contact surface closes
 if its angle is less than the least angle. Both rules together require a gap to the wall of at least
-min(film, tan(angle) d) at the distance d from the contact line. On straight edges, which the paper
-uses, all nodes up to the farthest one that violates the rule join the wall
+min(film, tan(angle) d) at the distance d from the contact line. On straight edges, as in the paper,
+all nodes up to the farthest one that violates the rule join the wall
 (:mod:`repro.model.closing_by_nodes`). On arcs the rule applies everywhere on the free surface, and
 contact lines lie anywhere on an arc (:mod:`repro.model.closing_by_lines`).
 """
@@ -28,27 +28,28 @@ from repro.model.finer_lines import with_finer_lines
 from repro.model.mechanics import Closing, Expansion, Mechanics
 from repro.model.pore import Pore
 
-#: By the geometry of the triangles.
+#: {geometry of the triangles: closing of films}.
 CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
-#: Largest number of equilibria on small triangles. After each one, the triangles are small where it
-#: has placed the lines.
+#: Largest number of equilibria on small triangles. Each one predicts where the next one needs small
+#: triangles.
 PREDICTIONS = 3
-#: Largest distance of a line from its expected place, over the size of the triangles there. At that
-#: distance they are five times as large.
+#: Largest distance of a line from its predicted position, over the size of the triangles there. At
+#: this distance the triangles are five times as large.
 MISSED = 4
-#: Growth of this size with the distance from a line. Bisection keeps the angles whatever it is.
+#: Growth of the triangles' size with the distance from a line. Bisection keeps good angles for any
+#: value.
 LINE_GRADATION = 1.0
-#: Contact lines stay in place after so many rounds of shape and fluid forces, because each search
-#: moves them by up to its tolerance or an edge. Nodes on a wall then stay there, too.
+#: Contact lines do not move any more after this number of rounds of shape and fluid forces, because
+#: each search moves them by up to its tolerance or an edge. Nodes on a wall then stay there too.
 SETTLING_ROUNDS = 4
 #: Shape and flow agree if the last round moves no node by more than this, over the aggregate's
 #: thickness.
 FORCE_REST = 1e-8
-#: Or by more than this, if further rounds do not reduce the move because of round-off.
+#: The same bound, if round-off prevents that further rounds reduce the move.
 FORCE_ROUND_OFF = 1e-6
-#: Rounds of forces that are combined, and within which the least move must fall.
+#: Anderson acceleration combines this number of rounds. The least move must fall within as many.
 FORCE_WINDOW = 5
-#: The move stalls if FORCE_WINDOW rounds do not reduce the least move by this factor.
+#: The rounds stall if FORCE_WINDOW of them do not reduce the least move by this factor.
 FORCE_REDUCTION = 0.5
 
 
@@ -61,7 +62,7 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     ----------
     mechanics : Mechanics
     grown : Pore
-        Biomass as it has grown, in the old shape.
+        The pore with the grown biomass, in the old shape.
     theta : sequence of (t, q) float
         Expansion of each aggregate since t = 0.
     guess : Pore, optional
@@ -81,14 +82,15 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
 
     Notes
     -----
-    With fluid forces, shape and flow are computed in turn until both agree. A shape changes its
-    forces by a part of the change that gave the shape, up to 0.6 of it after contact. Anderson
-    acceleration therefore chooses the forces of a round. After the first contact the film's
-    thickness counts under the forces of the open pore, because a closed pore has larger forces.
+    With fluid forces, shape and flow are computed in turn until both agree. If the forces change,
+    the flow around the new shape changes them again, by up to 0.6 of the first change after
+    contact. Anderson acceleration therefore chooses the forces of each round. The film at the first
+    contact is tested under the forces of the open pore, because the forces are larger in a closed
+    pore.
 
-    If ``search.line_size`` is finite, triangles are bisected where ``search.advances`` expects the
-    contact lines with the opposite wall. If there is no equilibrium on them, the result is the
-    equilibrium on the mesh.
+    If ``search.line_size`` is finite, triangles are bisected where ``search.advances`` predicts the
+    contact lines with the opposite wall. If there is no equilibrium on the bisected triangles, the
+    result is the equilibrium on the original mesh.
     """
     start = guess or grown
     if search.line_size < inf and len(_lines_after(grown, search.advances)):
@@ -113,8 +115,10 @@ def _on_small_triangles(mechanics: Mechanics, grown: Pore, theta: Sequence[np.nd
 
 
 def _lines_after(grown: Pore, advances: Advances) -> np.ndarray:
-    """(K, 2) um, the points of the grown outlines where contact lines with opposite walls are
-    expected after their advances; empty without such lines."""
+    """(K, 2) um, predicted positions on the grown outlines of contact lines with opposite walls.
+
+    Empty without such lines.
+    """
     lines = [(outline, line, advances[number, *line.key])
              for number, outline in enumerate(grown.outlines)
              for line in contact_lines.lines_of(outline)
@@ -124,8 +128,10 @@ def _lines_after(grown: Pore, advances: Advances) -> np.ndarray:
 
 def _bisected(grown: Pore, theta: Sequence[np.ndarray], lines: np.ndarray,
               size: float) -> tuple[Pore, list[np.ndarray], Bisection]:
-    """A grown pore with its masses, and its theta, on triangles of a size (um) beside points (K, 2)
-    um."""
+    """A grown pore and its theta, with triangles of a size (um) beside points ``lines`` (K, 2) um.
+
+    Also returns the bisection.
+    """
     bodies = [replace(body, theta=each) for body, each in zip(grown.bodies, theta)]
     fine, bisection = with_finer_lines(replace(grown, bodies=tuple(bodies)), lines, size,
                                        LINE_GRADATION)
@@ -140,7 +146,7 @@ def _bisected(grown: Pore, theta: Sequence[np.ndarray], lines: np.ndarray,
 
 def _expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], start: Pore,
             search: SearchOptions) -> Expansion:
-    """:func:`expand` on the mesh of a grown pore."""
+    """:func:`expand` on the mesh of the grown pore."""
     if mechanics.fluid is None or not grown.bodies:
         return shape_under(mechanics, grown, theta, start, None, search)
     water = traction.SurroundingFlow(mechanics.fluid, grown)
@@ -171,10 +177,10 @@ def _expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], star
 
 @dataclass(eq=False)
 class _Rounds:
-    """Rounds of fluid forces and the shape under them.
+    """Rounds of fluid forces and shapes.
 
-    forces: (n, 2) of each round; responses: those of the flow around the shape before each round;
-    moves: um, the largest move of a node in each round.
+    forces: (n, 2) of each round; responses: (n, 2) forces of the flow around the shape before each
+    round; moves: um, the largest move of a node in each round.
     """
 
     forces: list[np.ndarray] = field(default_factory=list)
@@ -182,11 +188,11 @@ class _Rounds:
     moves: list[float] = field(default_factory=list)
 
     def next_forces(self, response: np.ndarray) -> np.ndarray:
-        """Forces of the next round, from those of the flow around the last shape.
+        """Forces (n, 2) of the next round; response: (n, 2) forces of the flow around the shape.
 
-        Once contact lines stay in place, Anderson acceleration combines the last rounds so that
-        their forces differ least from their response (Walker and Ni 2011, SIAM J. Numer. Anal. 49,
-        1715). Before, the forces are the response.
+        As long as contact lines move, the forces are the response. Afterwards Anderson acceleration
+        combines the last rounds so that forces and responses differ least (Walker and Ni 2011, SIAM
+        J. Numer. Anal. 49, 1715).
         """
         rounds = slice(max(SETTLING_ROUNDS, len(self.forces) - FORCE_WINDOW), None)
         self.responses.append(response)
@@ -202,8 +208,8 @@ class _Rounds:
 
     @property
     def stalled(self) -> bool:
-        """Do the last FORCE_WINDOW rounds not reduce the least move? The first rounds, in which
-        contact lines move, do not count."""
+        """Do the last FORCE_WINDOW rounds fail to reduce the least move? Rounds in which contact
+        lines move do not count."""
         settled = self.moves[SETTLING_ROUNDS:]
         before = settled[:-FORCE_WINDOW]
         return bool(before) and min(settled[-FORCE_WINDOW:]) > FORCE_REDUCTION * min(before)
@@ -218,7 +224,7 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
                 forces: np.ndarray | None, search: SearchOptions) -> Expansion:
     """The new shapes under constant nodal forces (n, 2) um, over mu_L; None for no forces.
 
-    One aggregate after the other takes its shape. None of them touches another one.
+    The shapes are computed one after the other, unless aggregates are welded.
     """
     mesh = grown.mesh
     bodies = [replace(body, theta=expansion,
@@ -240,6 +246,6 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
 
 
 def divided_start(start: Pore, shape: Pore, division: Division | Bisection) -> Pore:
-    """The pore from which further searches start, on the mesh of a shape with divided triangles."""
+    """The start of further searches, carried to the mesh of a shape with divided triangles."""
     divided = shape.moved(division.nodal(start.mesh.points))
     return replace(divided, pressure=division.at_corners(start.pressure))

@@ -1,20 +1,20 @@
 """Positions of the contact lines on the aggregate's boundary (2.3.3), for curved triangles.
 
-A contact line is the end of a contact surface. Its advance is the number of arcs of the boundary
-that have joined the wall beyond its previous position; a fraction divides an arc. The clearance
-beyond a line is the smallest value on the free surface of
+A contact line is an end of a contact surface. Its advance is the number of arcs of the boundary
+that have joined the wall beyond its previous position. A fractional advance divides an arc. The
+clearance beyond a line is the minimum over the free surface of
 
     gap / min(film, tan(angle) d) - 1
 
-at the distance d from the line along the wall. If it is negative, a film or a wedge is too thin.
-Beside the line the surface opens like the root of d, and the angle of the first arc depends on the
-arc's length. The angle is therefore tested at distances of ANGLE_FROM film / tan(angle) or more. A
-converged surface comes nearest to the wall there. Closer to the line PART_OF_ANGLE tan(angle)
-suffices, so that no arc passes the wall.
+where d is the distance from the line along the wall. If the clearance is negative, a film or a
+wedge is too thin. Beside the line the surface opens like the square root of d, and the angle of the
+first arc depends on the length of this arc. The angle is therefore tested from the distance
+ANGLE_FROM film / tan(angle) on. A converged surface comes nearest to the wall beyond this distance.
+Closer to the line the rule uses PART_OF_ANGLE tan(angle), so that no arc passes the wall.
 
 The contact surface is the smallest one without a negative clearance, so each line advances until
-its clearance vanishes. The secant method, safeguarded by bisection, searches for all lines at once.
-Each trial is an equilibrium of the aggregate.
+its clearance vanishes. The secant method, safeguarded by bisection, moves all lines at once. Each
+trial is an equilibrium of the aggregate.
 """
 
 from __future__ import annotations
@@ -31,52 +31,54 @@ from repro.fem.outline import Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Walls, numbered
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
-#: With 2e-3 that was 0.01 um, up to 0.2 % of a short length of contact (``growth-gold-contact``).
+#: With 2e-3 this error was 0.01 um, up to 0.2 % of a short contact length
+#: (``growth-gold-contact``).
 CLOSE = 5e-4
 #: Least distance from a line at which the angle is tested, over film / tan(angle). The converged
 #: surfaces of reference/gold come nearest to the wall at 0.31 to 1 of film / tan(angle).
 ANGLE_FROM = 0.2
 #: Relative round-off of a distance.
 ROUND_OFF = 1e-9
-#: Tangent of the least angle closer to the line, over tan(angle). A converged surface is steeper.
+#: Closer to the line than ANGLE_FROM, the rule's tan(angle) is multiplied by this. A converged
+#: surface is steeper.
 PART_OF_ANGLE = 0.1
 #: Upper bound of the clearance, and its value if no free surface faces the wall.
 AMPLE = 10.0
-#: If an advance that is too short and one that is far enough are closer than this (arcs), the
-#: clearance is taken to jump between them.
+#: The clearance counts as discontinuous if an advance that is too short and one that is far enough
+#: differ by less than this (arcs).
 SAME_PLACE = 5e-3
 #: Smallest part of a divided arc (arcs).
 LEAST_PART = 0.02
-#: The first trial, as a fraction of the way to the farthest point that is too near to the wall.
+#: Length of the first step over the distance to the farthest point that is too near to the wall.
 FIRST_TRIAL = 0.7
-#: The second trial after a first one that went too far, as a fraction of the way back.
+#: If the first trial goes too far, the second one goes back by this fraction of the interval.
 FIRST_RETREAT = 0.2
 #: Factor on secant steps until a trial goes far enough.
 BEYOND = 1.05
-#: Longest step (arcs) before a trial goes far enough, if no surface beyond the line is too near.
+#: Longest step (arcs), until a trial goes far enough, if no surface beyond the line is too near.
 LEAST_REACH = 0.5
-#: Secant steps keep this fraction of the interval away from its ends.
+#: Least distance of a secant step from the ends of the interval, as a fraction of the interval.
 INSIDE = 0.03
 MEET = "two contact lines meet and trap fluid between them"
-#: Parameters of an arc at which the clearance is computed: the second shows the angle at the line.
+#: Parameters of an arc at which the clearance is computed. The second one tests the angle at the
+#: line.
 PLACES = np.append([0.0, 1e-3], np.linspace(0.0, 1.0, 9)[1:])
 AT_PLACES = parabola(PLACES)
 
 
-#: {(number, wall, direction): um} of the contact lines of all aggregates.
+#: {(number, wall, direction): advance (um)} of the contact lines of all aggregates.
 Advances: TypeAlias = Mapping[tuple[int, int, int], float]
 
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """How contact lines are searched for.
+    """Options of the search for contact lines.
 
-    landing: the search ends if the film at the first contact is thinner than this fraction of the
-    least film; stationary: do lines stay at their first trial, and nodes on the start's walls;
-    patient: is a failed equilibrium tried again in smaller parts; advances: {(number, wall,
-    direction): um} of the first trial, along the outline of an aggregate, by its place in the list;
-    line_size: um, size of the triangles beside the lines with the opposite wall; infinite: that of
-    the mesh.
+    landing: the search fails if the film at the first contact is thinner than this fraction of the
+    least film; stationary: do lines stay at their first trial, and nodes on the walls of the
+    start?; patient: is a failed equilibrium tried again in smaller parts?; advances: {(index of the
+    aggregate, wall, direction): um along its outline}, first trial of each line; line_size: um,
+    size of the triangles beside the lines with the opposite wall, infinite to keep the mesh.
     """
 
     landing: float = 0.0
@@ -86,7 +88,9 @@ class SearchOptions:
     line_size: float = inf
 
     def refuse_late(self, gaps: tuple[float, float], film: float) -> None:
-        """Raise FirstContact if the second of two gaps (um) is much less than the least film (um).
+        """Raise FirstContact if the second gap is below ``landing`` times the least film.
+
+        gaps: um, before and after the step; film: um, the least film.
         """
         if gaps[1] < self.landing * film:
             raise FirstContact(gaps)
@@ -96,9 +100,9 @@ PATIENT = SearchOptions()
 
 
 class FirstContact(Exception):
-    """The film to the opposite wall is much thinner than the least film at the end of a step.
+    """A step ends too long after the first contact: the film is much thinner than the least film.
 
-    gaps: um, the thickness of that film at the start of the step and at its end.
+    gaps: um, the thickness of the film at the start and at the end of the step.
     """
 
     def __init__(self, gaps: tuple[float, float]):
@@ -115,23 +119,24 @@ class Clearance:
     angle: float
 
     def beyond(self, outline: Outline, node: int, direction: int) -> tuple[float, float]:
-        """The clearance beyond a contact line, and how far the surface is too near to the wall.
+        """The clearance beyond a contact line, and the distance up to which it is negative.
 
         Parameters
         ----------
         outline : Outline
-            With arcs.
+            An outline of arcs.
         node : int
             Corner of the outline at the contact line.
         direction : int
-            1 or -1: where the free surface lies along the outline.
+            1 or -1: direction along the outline from the line to the free surface.
 
         Returns
         -------
         clearance : float
             At most AMPLE; AMPLE if no free surface faces the wall.
         reach : float
-            Arcs from the line to the farthest point with a negative clearance, zero if none.
+            Number of arcs from the line to the farthest point with a negative clearance; zero
+            without such a point.
         """
         arcs, last = _free_arcs(outline, node, direction)
         outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
@@ -154,8 +159,12 @@ class Clearance:
         return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
 
     def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) arcs from the line, and (K, 2) um the points there: PLACES of each arc, and the
-        points where the rule begins, and where it changes from the angle to the film."""
+        """Points of the free surface at which the rule is tested: (K,) arcs from the line, (K, 2)
+        um.
+
+        They are PLACES of each arc, the points where the test of the angle begins, and the points
+        where the rule changes from the angle to the film.
+        """
         points = AT_PLACES @ arcs
         place = np.arange(len(arcs))[:, None] + PLACES
         places, all_points = [place.ravel()], [points.reshape(-1, 2)]
@@ -166,7 +175,7 @@ class Clearance:
             part = beyond[arc, k] / (beyond[arc, k] - beyond[arc, k + 1])
             t = PLACES[k] + part * np.diff(PLACES)[k]
             first, second = arc_derivatives(nodes[arc])
-            for _ in range(3):  # Newton's method; the interpolated place is near
+            for _ in range(3):  # Newton's method; the interpolated t is close
                 error = np.einsum("ka,ka->k", parabola(t), nodes[arc]) - change
                 t = t - error / (first + second * t)
             places.append(arc + t)
@@ -175,8 +184,8 @@ class Clearance:
 
 
 def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray, int]:
-    """(K, 3, 2) um, nodes of the free arcs beyond a contact line, from the line on; and the node
-    at their end."""
+    """(K, 3, 2) um, nodes of the free arcs beyond a contact line, from the line on; and the index
+    of the last node."""
     count = len(outline.points)
     walk = (node + direction * np.arange(count)) % count
     end = 1 + int(np.flatnonzero(outline.wall[walk[1:]] != FREE)[0])
@@ -185,8 +194,8 @@ def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray,
 
 
 def surface_ends(outline: Outline, wall: int) -> list[tuple[int, int]]:
-    """(node, direction) of each end of a contact surface: the next node in that direction is off
-    the wall."""
+    """(node, direction) of each end of the contact surfaces with a wall. The next node in this
+    direction is not on the wall."""
     on = outline.wall == wall
     if not on.any():
         return []
@@ -200,13 +209,14 @@ def surface_ends(outline: Outline, wall: int) -> list[tuple[int, int]]:
 class Line:
     """A contact line in a search.
 
-    wall: its number; node: of the outline, at the previous position of the line; direction: of
-    the free surface along the outline; advance: arcs, of the present trial; accepted: is the
-    present trial accurate enough; reach: arcs beyond it where the surface is too near; least: the
-    smallest advance; short, far: largest advance that is too short and smallest one that is far
-    enough; stalls: has the last trial halved neither the interval between these nor the clearance;
-    trials: the last two, as (advance, clearance); floor: least advance that Newton's method allows,
-    just beyond the last corner at which the line rests or was too short.
+    wall: number of its wall; node: of the outline, at the previous position of the line; direction:
+    1 or -1, along the outline from the line to the free surface; advance: arcs, of the present
+    trial; accepted: is the present trial accurate enough?; reach: arcs beyond the line up to which
+    the surface is too near to the wall; least: smallest allowed advance; short: largest advance
+    known to be too short; far: smallest advance known to be far enough; stalls: has the last trial
+    halved neither the interval from short to far nor the clearance?; trials: the last two, as
+    (advance, clearance); floor: smallest advance that Newton's method allows, just beyond the last
+    corner at which the line rests or was too short.
     """
 
     wall: int
@@ -224,16 +234,16 @@ class Line:
 
     @property
     def key(self) -> tuple[int, int]:
-        """Wall and direction: no two lines share both."""
+        """Wall and direction. They identify a line of an aggregate."""
         return self.wall, self.direction
 
     def end_on(self, outline: Outline) -> int:
-        """The node of a trial's outline at the line: the end of a contact surface."""
+        """The node at the line in the outline of a trial."""
         ends = surface_ends(outline, self.wall)
         return next(node for node, direction in ends if direction == self.direction)
 
     def record(self, clearance: float, reach: float) -> None:
-        """Update the interval and the trials with the clearance beyond the present trial."""
+        """Update the interval and the trials with the clearance at the present advance."""
         self.reach = reach
         if not self.trials or self.trials[-1][0] != self.advance:
             self.trials = [*self.trials[-1:], (self.advance, clearance)]
@@ -255,13 +265,13 @@ class Line:
         self.accepted = not too_short and (smallest or clearance <= CLOSE or jumps)
 
     def start_from(self, advance: float) -> None:
-        """Set the smallest advance and the first trial to an advance in arcs."""
+        """Set the smallest allowed advance and the first trial to an advance (arcs)."""
         self.least = advance
         self.short = advance
         self.advance = advance
 
     def retreat(self) -> bool:
-        """Go half of the way back to the last advance that was too short; has the line moved?"""
+        """Go half of the way back to ``short``. Returns whether the line has moved."""
         distance = self.advance - self.short
         if self.accepted or distance < LEAST_PART:
             return False
@@ -281,8 +291,11 @@ class Line:
             self.advance = min(max(self._secant(1.0), self.short + margin), self.far - margin)
 
     def _secant(self, factor: float) -> float:
-        """The advance at the root of the secant through the last two trials, its step multiplied
-        by a factor; with one trial, or if the secant falls, FIRST_TRIAL or FIRST_RETREAT."""
+        """The advance (arcs) at the root of the secant through the last two trials.
+
+        factor: of the step to the root. With one trial, or if the secant falls, FIRST_TRIAL or
+        FIRST_RETREAT determines the step.
+        """
         advance, clearance = self.trials[-1]
         if len(self.trials) == 2:
             before, clearance_before = self.trials[0]
@@ -295,20 +308,20 @@ class Line:
 
 
 def arc_ends(outline: Outline, line: Line) -> np.ndarray:
-    """(K + 1,) um along the chords of the free arcs beyond a line: where they begin and end."""
+    """(K + 1,) um, ends of the K free arcs beyond a line, measured along the chords."""
     arcs, _ = _free_arcs(outline, line.node, line.direction)
     chords = np.linalg.norm(arcs[:, 2] - arcs[:, 0], axis=1)
     return np.concatenate([[0.0], np.cumsum(chords)])
 
 
 def to_length(outline: Outline, line: Line) -> float:
-    """The advance of a line in um along its previous outline."""
+    """The advance of a line as a length (um) along its previous outline."""
     ends = arc_ends(outline, line)
     return float(np.interp(line.advance, np.arange(len(ends)), ends))
 
 
 def to_arcs(outline: Outline, line: Line, length: float) -> float:
-    """The advance, in arcs, of a length (um) along a line's previous outline."""
+    """The advance (arcs) of a line for a length (um) along its previous outline."""
     ends = arc_ends(outline, line)
     return float(np.interp(length, ends, np.arange(len(ends))))
 
@@ -322,8 +335,10 @@ def point_at(outline: Outline, line: Line, length: float) -> np.ndarray:
 
 
 def speeds(advances: Advances, number: int, duration: float) -> np.ndarray | None:
-    """(2, 2) um/h, speeds of an aggregate's lines that have advanced (um) in a duration (h), by
-    wall and direction; None with lines of one wall only."""
+    """(2, 2) um/h, speeds of an aggregate's lines by wall and direction.
+
+    advances: um, in a duration (h). Returns None if all lines are on one wall.
+    """
     own = {key[1:]: length for key, length in advances.items() if key[0] == number}
     walls = {wall for wall, _ in own}
     if len(walls) < 2:
@@ -336,8 +351,10 @@ def speeds(advances: Advances, number: int, duration: float) -> np.ndarray | Non
 
 def advances_at(by_line: np.ndarray | None, number: int,
                 duration: float) -> dict[tuple[int, int, int], float]:
-    """{(number, wall, direction): um} by which an aggregate's lines advance in a duration (h) at
-    their :func:`speeds`."""
+    """{(number, wall, direction): um}, advances of an aggregate's lines in a duration (h).
+
+    by_line: as :func:`speeds` returns it.
+    """
     if by_line is None:
         return {}
     return {(number, wall, direction): float(by_line[wall - 1, (1 - direction) // 2] * duration)
@@ -345,7 +362,7 @@ def advances_at(by_line: np.ndarray | None, number: int,
 
 
 def lines_of(outline: Outline) -> list[Line]:
-    """All contact lines of an outline, by the numbers of their walls."""
+    """All contact lines of an outline, in the order of the numbers of their walls."""
     walls = np.unique(outline.wall[outline.wall != FREE]).tolist()
     return [Line(wall, node, direction) for wall in walls
             for node, direction in surface_ends(outline, wall)]
@@ -353,10 +370,10 @@ def lines_of(outline: Outline) -> list[Line]:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Walls of an outline's nodes with arcs that are divided at contact lines.
+    """Contact of an outline whose arcs are divided at contact lines.
 
-    wall: (M,) of the outline's own nodes; arcs: (d,) numbers of the divided arcs, ascending; t:
-    (d,) parameters of their divisions; first, second: (d,) walls of their two parts.
+    wall: (M,) of the nodes of the undivided outline; arcs: (d,) numbers of the divided arcs,
+    ascending; t: (d,) parameter of each division; first, second: (d,) walls of both parts.
     """
 
     wall: np.ndarray
@@ -367,14 +384,17 @@ class Contact:
 
 
 def divided_arc(outline_nodes: int, line: Line) -> int:
-    """Number of the arc of an outline with so many nodes in which a line lies."""
+    """Number of the arc in which a line lies; outline_nodes: number of nodes of the outline."""
     arcs = int(np.floor(line.advance))
     along = arcs if line.direction == 1 else -arcs - 1
     return (line.node // 2 + along) % (outline_nodes // 2)
 
 
 def contact_with(wall: np.ndarray, lines: Sequence[Line]) -> Contact:
-    """The contact of walls (M,) after lines have advanced."""
+    """The contact after the lines have advanced from walls (M,).
+
+    Raises GrowthError if two lines meet.
+    """
     joined = wall.copy()
     count = len(wall)
     cuts = {}

@@ -1,14 +1,14 @@
 """Newton's method for an aggregate's shape and the positions of its contact lines together.
 
 The unknowns are positions, pressures and the advance s of each contact line. The equations are the
-equilibrium, R = 0, and the clearance beyond each line, c = 0 (2.3.3). A line at its least advance
-stays there while its clearance is not negative. K is the derivative of R by the shape. If a line
-advances, the shape moves by K^-1 (-dR/ds), one more solution with the factors of K. dR/ds is a
-difference quotient over the triangles beside the line, and dc/ds is one of the clearance on the
-moved outline.
+equilibrium, R = 0, and zero clearance beyond each line, c = 0 (2.3.3). A line at its least advance
+stays there as long as its clearance is not negative. K is the derivative of R by the shape. If a
+line advances, the shape moves by K^-1 (-dR/ds), one more solution with the factors of K. dR/ds is a
+difference quotient over the triangles beside the line. dc/ds is a difference quotient of the
+clearance on the moved outline.
 
-The clearance is a minimum over the free surface, and jumps where a film closes. The method may
-therefore fail. The search with whole equilibria (:mod:`repro.model.contact_lines`) then takes over.
+The clearance is a minimum over the free surface, and it jumps when a film closes. The method may
+therefore fail. The search of :mod:`repro.model.contact_lines` then replaces it.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from repro.model.solid import Shape
 from repro.polling import poll
 from repro.scene import needed
 
-#: Iterations after which the search with whole equilibria takes over.
+#: Largest number of iterations before the method gives up.
 MOST_ITERATIONS = 20
-#: (iterations, defect): the search also takes over if the defect is larger than this after so many
-#: iterations. In 19 pores this would have stopped seven of 414 solutions that converged. It saves a
-#: quarter of the processor time of 63 that did not.
+#: (n, defect): the method also gives up if the defect after n iterations is larger. In 19 pores
+#: this would have stopped seven of 414 solutions that converged. It saves a quarter of the
+#: processor time of 63 that did not.
 EARLY = 12, 0.5
-#: Differences of an advance (arcs) for the derivatives of residual and clearance.
+#: Differences of an advance (arcs) for the derivatives of the residual (first) and the clearance.
 SMALL = 1e-5
 MODEST = 0.02
 #: Longest step (arcs) of a line.
 LONGEST = 2.0
-#: A line does not move while its clearance is within this.
+#: A line does not move if its clearance is at most this.
 AT_REST = CLOSE / 2
-#: A line beside a corner lies this far (arcs) before or beyond it.
+#: A line beside a corner lies at this distance (arcs) before or beyond it.
 BESIDE = 1.01 * LEAST_PART
-#: Advances (arcs) that differ by less are the same.
+#: Two advances are equal if they differ by less than this (arcs).
 SAME = 1e-9
 #: Step (arcs) of a line away from a corner at which it is not at rest.
 DEPARTURE = 0.3
-#: A line leaves a corner if the shape's defect is smaller than this.
+#: A line leaves or crosses a corner only if the defect of the shape is smaller than this.
 NEAR = 0.05
-#: Halvings of a step that turns a triangle over.
+#: Number of trial lengths of a step: 1, 1/2, 1/4 ..., until no triangle is turned over.
 HALVINGS = 5
 
 
@@ -62,8 +62,9 @@ class Placed:
 
     grown: the pore before its expansion; pore: the same on the divided mesh, with its contact;
     division: None if no arc is divided; reference: (N, 2) um, nodes of the grown pore in the
-    configuration from which strain counts; system: of the equilibrium; theta: (t, q) expansion;
-    target: (n, 2) um, with the prescribed coordinates; rule: for the free surface.
+    configuration from which strain counts; system: of the equilibrium; theta: (t, q) expansion
+    since this configuration; target: (n, 2) um, positions that contain the prescribed coordinates;
+    rule: for the free surface.
     """
 
     grown: Pore
@@ -76,7 +77,8 @@ class Placed:
     rule: Clearance
 
     def clearances(self, position: np.ndarray, lines: Sequence[Line]) -> np.ndarray:
-        """(2, L) clearance and reach beyond lines, at positions (n, 2) um."""
+        """(2, L) clearance and reach beyond L lines (:meth:`Clearance.beyond`), for positions
+        (n, 2) um."""
         pore = self.pore
         points = position[pore.region.own_loop]
         outline = Outline(points, pore.body.wall, pore.body.fixed, points, 2)
@@ -91,8 +93,9 @@ class Placed:
         return contact_lines.divided_arc(len(self.grown.body.wall), line)
 
     def slope(self, line: Line, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-        """(2n + corners,) derivative of the residual by the advance (arcs) of a line within an
-        arc, at constant nodal values. It ignores that the load of a support changes with the line.
+        """(2n + corners,) derivative of the residual by the advance (arcs) of a line within an arc.
+
+        Nodal values are constant. The change of a support's load with the line is neglected.
         """
         division = needed(self.division, "a divided arc")
         number = int(np.searchsorted(division.arcs, self._arc(line)))
@@ -114,8 +117,8 @@ class Placed:
 
     def on_parent(self, position: np.ndarray,
                   pressure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(N, 2) um and (corners,) at the nodes of the grown pore's mesh, from positions (n, 2) and
-        pressures of the divided aggregate."""
+        """Positions (N, 2) um and pressures (corners,) on the grown pore's mesh, from those of the
+        divided aggregate, (n, 2) um and (corners of the aggregate,)."""
         shape = self.pore.placed(position, pressure)
         if self.division is None:
             return shape.mesh.points, shape.pressure
@@ -143,8 +146,8 @@ class Coupled:
 
     def __init__(self, place: Callable[[], Placed], lines: Sequence[Line], points: np.ndarray,
                  pressures: np.ndarray):
-        """place: the aggregate with the lines at their present advances; points: (N, 2) um, and
-        pressures: (corners,), from which to start, at the nodes of the grown pore."""
+        """place: returns the aggregate with the lines at their present advances; points: (N, 2) um,
+        and pressures: (corners,), start of the iteration at the nodes of the grown pore."""
         self._place = place
         self._lines = lines
         self.placed = place()
@@ -156,8 +159,10 @@ class Coupled:
 
     @failing_as(GrowthError)
     def solve(self, tolerance: float = growth.NEWTON) -> None:
-        """Solve to a defect of ``tolerance``, or to round-off. Raises GrowthError if there is no
-        convergence."""
+        """Solve to a defect of ``tolerance``, or to round-off.
+
+        Raises GrowthError if there is no convergence.
+        """
         last = np.inf
         moving = True
         while True:
@@ -185,7 +190,7 @@ class Coupled:
                    for line, clearance in zip(self._lines, clearances))
 
     def _step(self, iterate: growth.Iterate) -> bool:
-        """Make one step of shape and lines, with det F > 0. Do the lines move?"""
+        """Make one step of shape and lines that keeps det F > 0. Returns whether lines move."""
         lag = iterate.lag
         carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(self.pressure))])
         factors = self._factors or self.placed.system.factored(iterate)
@@ -210,9 +215,9 @@ class Coupled:
 
     def _with_lines(self, iterate: growth.Iterate, factors: Factored,
                     change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(L,) arcs, steps of the lines, and the change of all unknowns that includes these steps.
+        """Steps (L,) of the lines (arcs), and the change of all unknowns with these steps.
 
-        change: without the steps.
+        change: of all unknowns, with lines at rest.
         """
         ahead = self.position + _nodal(change, self.position)
         clearances, reaches = self.placed.clearances(ahead, self._lines)
@@ -239,11 +244,11 @@ class Coupled:
 
     def _to_roots(self, position: np.ndarray, moves: dict[int, np.ndarray],
                   clearances: np.ndarray, near: bool) -> np.ndarray:
-        """Steps (arcs) of the lines to the roots of their clearances; moves: (n, 2) um per arc.
+        """Steps (arcs) of the lines to the roots of their clearances.
 
-        If a line stops before its root, the other lines still reach theirs. A line just beyond a
-        corner rests there if its root lies between the places on both sides of the corner. near:
-        is the shape close to equilibrium?
+        moves: {line: (n, 2) um per arc}. If a line stops before its root, the steps of the other
+        lines are solved for again. A line just beyond a corner rests there if its root lies between
+        BESIDE before and BESIDE beyond the corner. near: is the shape close to equilibrium?
         """
         lines = [self._lines[k] for k in moves]
         rises = np.array([self.placed.clearances(position + MODEST * move, lines)[0] - clearances
@@ -267,12 +272,15 @@ class Coupled:
 
 
 def _nodal(change: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """(n, 2) um, the part of a change of all unknowns that moves the nodes."""
+    """(n, 2) um, displacements in a change of all unknowns."""
     return change[: position.size].reshape(2, -1).T
 
 
 def _fits(line: Line, clearance: float, close: float) -> bool:
-    """Is a line in place? At the smallest allowed advance its clearance may be larger."""
+    """Is a line in place, with a clearance of zero up to ``close``?
+
+    At the smallest allowed advance the clearance may be larger.
+    """
     smallest = line.advance <= max(line.least, line.floor)
     return clearance >= -close and (smallest or clearance <= close)
 
@@ -297,11 +305,11 @@ def _beyond_corner(advance: float) -> bool:
 
 
 def _place(line: Line, start: float, step: float, near: bool = True) -> float:
-    """The place (arcs) of a line after a step (arcs) from ``start``.
+    """The advance (arcs) of a line after a step (arcs) from ``start``.
 
-    A line that would come closer to a corner than LEAST_PART stops BESIDE beyond it. If it lies
-    there already, it goes to BESIDE before the corner. It crosses the corner in this way, or back,
-    only close to equilibrium.
+    If the step ends closer than LEAST_PART to a corner, the line stops at BESIDE beyond the corner.
+    If it is there already, it goes to BESIDE before the corner. near: is the shape close to
+    equilibrium? Otherwise a line beside a corner does not cross it.
     """
     place = max(start + min(max(step, -LONGEST), LONGEST), line.least, line.floor)
     corner = round(place)

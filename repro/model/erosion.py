@@ -1,14 +1,14 @@
-"""Erosion of the aggregates' free surfaces, which recede along their normal.
+"""Erosion: the aggregates' free surfaces recede along their normal with one of these speeds.
 
     constant            v
     thickness squared   k z^2, z: distance from the wall of the seed (Wanner and Gujer 1986, Xavier
                         et al. 2005)
     shear               k max(tau - tau_c, 0), tau: shear of the water on the surface
 
-``growth.erosion.law`` chooses one; :func:`law_of` alone knows its words. The midpoint rule advances
-the surface: it recedes for half of the time, and the speed and the normals there move it for the
-whole time. The error of a step is of third order in its length. What the surface passes leaves the
-pore.
+``growth.erosion.law`` selects one by :func:`law_of`. The midpoint rule advances the surface. The
+surface first recedes for half of the time. The speed and the normals of this half-way surface then
+move the original surface for the whole time. The error of a step is of third order in its length.
+The biomass outside the new surface leaves the pore.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from repro.scene import Flow as Drive
 from repro.scene import Scene, at_time, needed
 from repro.timing import timed
 
-#: (M,) MPa, shear of the water at the nodes of an outline near a surface.
+#: Function: (M,) MPa, shear of the water at the nodes of an outline close to the surface.
 Shear: TypeAlias = Callable[[Outline], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Constant:
-    """speed: v, um/h."""
+    """Constant speed; speed: v, um/h."""
 
     speed: float
     follows_water = False
@@ -54,7 +54,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class ThicknessSquared:
-    """coefficient: k, 1/(um h)."""
+    """Speed k z^2; coefficient: k, 1/(um h)."""
 
     coefficient: float
     follows_water = False
@@ -66,7 +66,7 @@ class ThicknessSquared:
 
 @dataclass(frozen=True)
 class ByShear:
-    """coefficient: k, um/(h MPa); critical: tau_c, MPa."""
+    """Speed k max(tau - tau_c, 0); coefficient: k, um/(h MPa); critical: tau_c, MPa."""
 
     coefficient: float
     critical: float
@@ -91,7 +91,10 @@ def law_of(keys: Keys) -> Law:
 
 @dataclass(frozen=True, eq=False)
 class Erosion:
-    """Data from which surfaces recede: law, flow around them, and meshes."""
+    """Data of erosion.
+
+    law: speed of the surfaces; solver: flow around them; remeshing: meshes after erosion.
+    """
 
     law: Law
     solver: Solver
@@ -99,7 +102,7 @@ class Erosion:
 
     @classmethod
     def of(cls, scene: Scene) -> Erosion:
-        """The erosion of a scene that has it."""
+        """The erosion of a scene with [growth.erosion]."""
         keys = needed(scene.growing.growth.erosion, "[growth.erosion]")
         return cls(law_of(keys), Solver.of(scene), Remeshing.of(scene))
 
@@ -132,7 +135,7 @@ class Erosion:
         return recession.moved(outline, duration * self._velocities(pore, outline, shear))
 
     def _prepared(self, pore: Pore, outline: Outline, shear: Shear, duration: float) -> Outline:
-        """The outline without the arcs that the surface passes in a duration (h)."""
+        """The outline after arcs that shrink too much in a duration (h) have joined neighbours."""
         while True:
             moves = duration * self._velocities(pore, outline, shear)
             fewer = recession.merged(outline, moves)
@@ -141,7 +144,7 @@ class Erosion:
             outline = fewer
 
     def _shears(self, pore: Pore, outlines: Sequence[Outline]) -> list[Shear]:
-        """The shear of the water around aggregates in outlines, at the time of a pore."""
+        """The shear of the water on each outline, at the time of a pore."""
         if not self.law.follows_water:
             return [_no_shear for _ in outlines]
         space = pore.space
@@ -160,7 +163,7 @@ def _no_shear(outline: Outline) -> np.ndarray:
 
 
 def _along(outline: Outline, shear: np.ndarray) -> Shear:
-    """Interpolate a shear (M,) MPa at the nodes of an outline along it."""
+    """Interpolate a shear (M,) MPa at the nodes of an outline along the outline."""
     ring = shapely.LinearRing(outline.points)
     along = np.append(0.0, np.cumsum(outline.edge_lengths()))
 
@@ -175,9 +178,9 @@ def surface_shear(space: Space, water: Flow, drive: Drive, outline: Outline,
                   region: Region) -> np.ndarray:
     """(M,) MPa, shear rho nu |t . (grad u + grad u^T) n| of the water at the nodes of a surface.
 
-    The velocity gradient is the linear fit in the triangle beside an arc: a curved triangle in the
-    corner at a contact line may have a node where its map is nearly singular. A corner of two arcs
-    has the mean of both; nodes on a wall that are no contact lines have none.
+    The velocity gradient is a linear fit in the triangle beside each arc, because the map of a
+    curved triangle at a contact line may be nearly singular at a node. A corner has the mean of the
+    values of both arcs. The shear is zero at nodes within a contact surface.
     """
     mesh = space.mesh
     free = np.flatnonzero(outline.edge_wall == FREE)

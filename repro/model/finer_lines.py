@@ -1,4 +1,4 @@
-"""Smaller triangles beside contact lines, in which an aggregate keeps its shape and its fields."""
+"""Smaller triangles beside contact lines. The aggregates keep their shapes and their fields."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from repro.model.solid import Solid, material
 
 def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
                      gradation: float) -> tuple[Pore, Bisection]:
-    """Bisect the triangles beside points (K, 2) um, down to a size (um); the shapes stay.
+    """Bisect the triangles beside points ``lines`` (K, 2) um, down to a size (um).
 
-    The size grows by ``gradation`` times the distance from the points. The result has neither
-    masses nor substrates.
+    The size grows by ``gradation`` times the distance from the points. The shapes do not change.
+    The result has neither masses nor substrates.
     """
     def size_at(where: np.ndarray) -> np.ndarray:
         return size + gradation * np.linalg.norm(where[:, None] - lines, axis=2).min(axis=1)
@@ -52,8 +52,11 @@ def with_finer_lines(pore: Pore, lines: np.ndarray, size: float,
 
 
 def _areas(pore: Pore, mesh: Mesh, solids: Sequence[Solid]) -> list[np.ndarray]:
-    """(t, q) um2 of each aggregate: areas of the points where growth is integrated, per which
-    expansion is smooth. They are those at t = 0 if strain adds up, else the present ones."""
+    """For each aggregate, (t, q) um2, areas of the points where growth is integrated.
+
+    They are areas at t = 0 if strain adds up, and present areas otherwise. The expansion over this
+    area is smooth.
+    """
     if pore.accumulates:
         return [solid.at.dx for solid in solids]
     return [solid.at.dx * solid.strained(mesh.points[region.nodes]).J

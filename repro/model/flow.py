@@ -8,17 +8,19 @@ phi g / nu_water,
     a(u, v) - (p, div v) = 0
     (q, div u) + sum_tau (tau grad p, grad q) = 0
 
-with nu_r = 1 or lambda and a of :mod:`repro.model.interface` [E2];
-:mod:`repro.model.resistance` has permeable aggregates too.
-Quadratic velocities with a linear pressure (Taylor-Hood) need no tau. Where the
-viscosity jumps, the pressure jumps too. Each node of the interface therefore has a pressure of the
-fluid and one of the biomass. With a single pressure the head loss errs by up to 1 % if the
-aggregate spans the pore, and by 2 to 5 % if it bends (traction form), on every mesh that was tried.
-The pressure does not jump if the aggregate has the viscosity of water, as permeable ones have.
+with nu_r = 1 or lambda, and a(u, v) of :mod:`repro.model.interface` [E2].
+:mod:`repro.model.resistance` adds permeable aggregates.
+
+Quadratic velocities with a linear pressure (Taylor-Hood) need no tau. Where the viscosity jumps,
+the pressure jumps too. Each corner on the interface therefore has a pressure of the fluid and a
+pressure of the biomass. With a single pressure the head loss errs by up to 1 % if the aggregate
+spans the pore, and by 2 to 5 % if it bends (traction form), on every mesh that was tried. The
+pressure does not jump if the viscosity of the aggregate is that of water, as in permeable
+aggregates.
 
 Linear velocities with a linear pressure need tau = h_tau^2 / (c nu_r). The paper prints no constant
-c [E13]; ``reference/ERRATA.md`` reports its effect. By the second line ``w = u - tau grad p`` is
-divergence-free for every linear q: w carries the substrates.
+c [E13]; ``reference/ERRATA.md`` reports its effect. By the second equation, w = u - tau grad p is
+divergence-free against every linear q. Therefore w carries the substrates.
 """
 
 from __future__ import annotations
@@ -49,10 +51,10 @@ class Flow:
     """Flow through the pore.
 
     mean_velocity: um/h; velocity: (n, 2) um/h at the nodes of its space; head: (m,) um at the
-    mesh's corners; correction: (T, 2) um/h, tau grad p, so that w = u - correction, None where u
-    itself carries the substrates; meshed_loss, head_loss: um, over the meshed part and the whole
-    pore; conductivity: um/h; biomass_head: (m,) um, as head, on the interface that of the biomass;
-    None if the head does not jump there.
+    mesh's corners, on the interface that of the fluid; correction: (T, 2) um/h, tau grad p, so that
+    w = u - correction, None for quadratic velocities; meshed_loss, head_loss: um, over the meshed
+    part and over the entire pore; conductivity: um/h; biomass_head: (m,) um, like head, but on the
+    interface that of the biomass, None if the head does not jump there.
     """
 
     mean_velocity: float
@@ -67,10 +69,13 @@ class Flow:
 
 @dataclass(frozen=True, eq=False)
 class UnitFlow:
-    """Flow of mean velocity one: velocity (n, 2) and correction (T, 2) without unit, pressure (m,)
-    in 1/um at the corners (on the interface, that of the fluid), its loss over the meshed part,
-    1/um, and the pressure with that of the biomass on the interface if it jumps. The head loss (6)
-    is this loss times nu_water / g times the mean velocity."""
+    """Flow of mean velocity one.
+
+    velocity: (n, 2) and correction: (T, 2), without unit; pressure: (m,) 1/um at the corners, on
+    the interface that of the fluid; loss: 1/um, of pressure over the meshed part; biomass_pressure:
+    (m,) 1/um, on the interface that of the biomass, None if the pressure does not jump. The head
+    loss (6) is the loss times nu_water / g times the mean velocity.
+    """
 
     velocity: np.ndarray
     pressure: np.ndarray
@@ -86,7 +91,7 @@ def tau(mesh: Mesh, viscosity: np.ndarray | float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Linear velocity and pressure; tau: (T,) um2, by which grad p drives the correction."""
+    """Linear velocity and pressure; tau: (T,) um2, of the stabilisation."""
 
     velocity: Space
     tau: np.ndarray
@@ -104,8 +109,10 @@ class Linear:
         return each(mesh.areas, driven @ np.swapaxes(mesh.gradients, 1, 2))
 
     def prescribed(self) -> np.ndarray:
-        """:func:`prescribed`, with u_x at the inlet scaled so that the discrete flux is exactly
-        u_ave W: linear elements replace the parabola by its chords, which lose 1 / n^2 of it."""
+        """:func:`prescribed`, with u_x at the inlet scaled so that the discrete flux is u_ave W.
+
+        On n linear elements, chords replace the parabola and lose 1 / n^2 of the flux.
+        """
         inlet = self.velocity.inlet
         value = prescribed(self.velocity)
         flux = inlet.load(value[: self.velocity.count]).sum()
@@ -128,19 +135,19 @@ class TaylorHood:
 
     @staticmethod
     def on(velocity: Space, viscosity: np.ndarray) -> TaylorHood:
-        """The pair, which needs no viscosity."""
+        """The pair; it does not depend on the viscosity."""
         return TaylorHood(velocity)
 
     def prescribed(self) -> np.ndarray:
-        """:func:`prescribed`: these velocities represent the parabola exactly."""
+        """:func:`prescribed`; quadratic velocities represent the parabola exactly."""
         return prescribed(self.velocity)
 
     def unit(self, u: np.ndarray, pressure: np.ndarray, work: float) -> UnitFlow:
-        """The flow of a velocity and a pressure; its loss is the work of the inlet."""
+        """The flow of a velocity and a pressure; work: 1/um, the loss (:func:`work`)."""
         return UnitFlow(u, pressure, None, work)
 
 
-#: By the order of the velocity.
+#: {order of the velocity: pair of velocity and pressure}.
 PAIRS: dict[int, type[Linear] | type[TaylorHood]] = {1: Linear, 2: TaylorHood}
 
 
@@ -155,14 +162,14 @@ def interface_corners(mesh: Mesh) -> np.ndarray:
 
 
 def doubled(mesh: Mesh, corners: np.ndarray) -> np.ndarray:
-    """(T, 3) numbers of the pressures: in biomass, ``corners`` (d,) have the last d numbers."""
+    """(T, 3) numbers of the pressures. In biomass the d last numbers replace ``corners`` (d,)."""
     own = np.arange(mesh.corners)
     own[corners] = mesh.corners + np.arange(len(corners))
     return np.where(mesh.biomass[:, None], own[mesh.triangles], mesh.triangles)
 
 
 def divergence(velocity: Space) -> np.ndarray:
-    """(T, 3, 2k) element matrices of (q, div u): columns u_x of all nodes, then u_y."""
+    """(T, 3, 2k) element matrices of (q, div u); columns: u_x of all nodes, then u_y."""
     at = velocity.gradients_at
     q = velocity.gradient_table.linear
     return product(q, at.dx, at.div)
@@ -199,7 +206,7 @@ def stokes(velocity: Space, viscosity: np.ndarray, interface: Interface,
     """(T, 2k + 3, 2k + 3) element matrices of velocity and pressure.
 
     viscosity: (T,) nu_r; lower: (T, 3, 3) of (tau grad p, grad q), None without tau; more: (T, 2k,
-    2k) added to a(u, v).
+    2k) to add to a(u, v), None for nothing.
     """
     blocks = saddle_blocks(interface.a(velocity, viscosity), divergence(velocity), lower)
     if more is not None:
@@ -209,8 +216,8 @@ def stokes(velocity: Space, viscosity: np.ndarray, interface: Interface,
 
 
 def _system(velocity: Space, interface: Interface, splits: bool) -> ElementSystem:
-    """The system with u = 0 on the walls, a parabola at the inlet, and u_y = 0 at the outlet in the
-    traction form [E10]; splits: may the pressure jump across the interface?"""
+    """The system with the conditions of the walls, a parabola at the inlet, and u_y = 0 at the
+    outlet in the traction form [E10]. splits: may the pressure jump across the interface?"""
     dofs = velocity.dofs
     mesh = velocity.mesh
     constrained = np.zeros((velocity.count, 2), bool)
@@ -225,8 +232,8 @@ def _system(velocity: Space, interface: Interface, splits: bool) -> ElementSyste
 
 
 def prescribed(velocity: Space) -> np.ndarray:
-    """(2n,) values of the constrained velocities: the parabola u_x at the inlet (3), half of it
-    up to a plane of symmetry."""
+    """(2n,) values of the constrained velocities: the parabola u_x at the inlet (3), or half of the
+    parabola if one wall is a plane of symmetry."""
     value = np.zeros(2 * velocity.count)
     nodes = velocity.inlet.nodes
     wall, *_ = [wall for wall in velocity.mesh.walls if wall.no_slip]
@@ -236,20 +243,26 @@ def prescribed(velocity: Space) -> np.ndarray:
 
 
 def work(load: np.ndarray, solution: np.ndarray, width: float) -> float:
-    """Loss (1/um) as the work of the inlet per unit flux. It equals (6) where the flow is developed
-    and converges with twice the order of the velocity's gradient. load: (2n + m,), the system's
-    matrix times the prescribed values; solution: (2n + m,), of the system."""
+    """Loss (1/um) as the work at the inlet per unit flux.
+
+    It equals (6) if the flow is developed at the ends. It converges with twice the order of the
+    velocity's gradient. load: (2n + m,), the system's matrix times the prescribed values; solution:
+    (2n + m,), of the system.
+    """
     return float(load @ solution) / width
 
 
 def _drop(space: Space, pressure: np.ndarray) -> float:
-    """Mean pressure at the inlet less the mean at the outlet (6)."""
+    """Mean pressure at the inlet minus mean pressure at the outlet (6)."""
     return space.inlet.mean(pressure) - space.outlet.mean(pressure)
 
 
 def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
-    """Scale the unit flow to a scene's head over the whole pore, of a length (um), or to its mean
-    velocity: the problem is linear (2.1). The mean head at the outlet is zero (4)."""
+    """Scale the unit flow to the head or the mean velocity of ``drive``; the problem is linear.
+
+    The head is the loss over the entire pore, of a length (um) (2.1). The mean head at the outlet
+    is zero (4).
+    """
     viscosity = drive.kinematic_viscosity / drive.gravity
     beyond = length - (mesh.ends[1] - mesh.ends[0])
     total_loss = unit.loss + poiseuille_loss(beyond, mesh.whole_width)
@@ -277,7 +290,7 @@ def solve(velocity: Space, drive: Drive, length: float, *,
     drive : repro.scene.Flow
         Head or mean velocity, viscosities, and the permeability of the biomass.
     length : float
-        Length of the whole pore, um; the part without mesh is a clean channel.
+        Length of the entire pore, um. Beyond the mesh the pore is a clean channel.
     interface : Interface
         Form of the viscous term [E2].
 

@@ -11,16 +11,17 @@ For C_A and C_D, (7) and (8), the corrector is one linear system each,
 
     M (C - C_n - carry dC_n) / (weight h) + L C - b + m X_A (q(C*) + q'(C*) (C - C*)) = 0
 
-with M the mass matrix (lumped for linear concentrations), and L and b of
+where M is the mass matrix (lumped for linear concentrations), and L and b are those of
 :mod:`repro.model.transport`. The uptake at the points of the reaction uses the predicted X_A, and q
-is linearised in the substrate's own concentration. The acceptor sees the predicted donor, and the
-donor sees the corrected acceptor. (9) advances ln X_A and (10) X_I at the corrected concentrations:
-both stay positive. Fluxes are integrated by the formula of the concentrations that they change, so
-that supplied - out - consumed = stored to round-off. Where the corrector gives a negative
-concentration, the step is backward Euler's with the sink C q(C*) / C*, which keeps C >= 0.
+is linearised in the substrate's own concentration. The uptake of the acceptor uses the predicted
+donor, and the uptake of the donor uses the corrected acceptor. At the corrected concentrations (9)
+advances ln X_A and (10) advances X_I, so both masses stay positive. The same formula integrates
+concentrations and fluxes, so that supplied - out - consumed = stored to round-off. If the corrector
+gives a negative concentration, the step is backward Euler's with the sink C q(C*) / C*, which keeps
+C >= 0.
 
-Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the substrate's largest
-concentration.
+The step size is controlled by |C - C*| within the aggregate (3.3.2), relative to the substrate's
+largest concentration.
 """
 
 from __future__ import annotations
@@ -54,38 +55,42 @@ from repro.timing import timed
 #: biomass made or uptake is 2e-2 at a tolerance of 1e-1, 9e-4 at 1e-2, and 3.1e-4 at 1e-3. The
 #: tolerance therefore stays at 0.1 %.
 TOLERANCE = 1e-3
-#: A concentration may be below zero by this part of its supply, by the order of the elements. The
-#: lumped reaction of linear ones keeps them positive.
+#: {order of the elements: part of its supply by which a concentration may be below zero}. With
+#: linear elements the lumped reaction keeps concentrations positive.
 BELOW_ZERO = {1: 0.0, 2: UNRESOLVED}
 #: Bounds on the ratio of successive steps.
 LONGER = 2.0
 SHORTER = 0.2
-#: Size of a step over the size that would just be accepted.
+#: Ratio of a step's size to the size that would just be accepted.
 SAFETY = 0.8
-#: Longest first step (h). This step is of first order: its error is under 2e-4 with 45 s, and 2e-2
+#: Longest first step (h). This step is of first order. Its error is below 2e-4 with 45 s, and 2e-2
 #: with 720 s.
 FIRST = 45 / 3600
-#: A shorter step (h) fails.
+#: Least step (h); a shorter step fails.
 SHORTEST = 1e-6 / 3600
-#: Profiles are steady if further steps of LONG (h) would sum up to this change over the supply.
+#: Profiles are steady if all further steps of LONG (h) together would change them by at most this
+#: part of the supply.
 STEADY = 1e-9
 LONG = 1e6
-#: While profiles settle: the largest change over the supply in a step.
+#: In :func:`settle`: the largest change in a step, over the supply.
 SETTLING = 0.3
-#: While profiles settle: the factor by which steps grow and shrink, and the most steps.
+#: In :func:`settle`: the factor by which steps grow and shrink, and the largest number of steps.
 FASTER = 10.0
 MOST_STEPS = 1000
 
-#: A rate at each point (r, q), 1/h, or one number for all points.
+#: A rate (1/h): one value at each point (r, q), or one number for all points.
 Rate: TypeAlias = np.ndarray | float
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One time level: fields (s, n) of the modelled substrates (mg/L); biomass (2, r, q): rise
-    of ln X_A since the start, and X_I (um2 mg/L); flows (2, 4): acceptor and donor supplied,
-    out, consumed and their unmet demand since the start (um2 mg/L); the increments of all three
-    in the last step, and its size (h)."""
+    """One time level.
+
+    fields: (s, n) mg/L, of the modelled substrates; biomass: (2, r, q), rise of ln X_A since the
+    start, and X_I (um2 mg/L); flows: (2, 4) um2 mg/L, of acceptor and donor since the start:
+    supplied, out, consumed, unmet demand; field_rise, biomass_rise, flow_rise: their increments in
+    the last step; step: size (h) of the last step.
+    """
 
     fields: np.ndarray
     biomass: np.ndarray
@@ -98,8 +103,11 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Advance:
-    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows; steps: sizes of the
-    steps taken (h)."""
+    """Result of an integration.
+
+    active, inert: X_A and X_I (r, q) um2 mg/L at the end; concentrations: mg/L, at the end; flows:
+    over the duration; steps: sizes (h) of the steps.
+    """
 
     active: np.ndarray
     inert: np.ndarray
@@ -110,8 +118,11 @@ class Advance:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One substrate's equations: entries of its operator and of the mass matrix, in the order of
-    the system's columns, and both as matrices."""
+    """Equations of one substrate.
+
+    operator, storage: (d,) entries of L and of the mass matrix (:meth:`ElementSystem.entries`);
+    matrix, mass: both as (n, n) matrices; source: (n,) um2 mg/L/h; supply: mg/L.
+    """
 
     operator: np.ndarray
     storage: np.ndarray
@@ -123,9 +134,12 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """A problem with data of the scheme. active: (r, q) um2 mg/L at the start; watched: (n,) nodes
-    of the step control; scale: (2, 1) of the concentrations; living: are F3 and F4 integrated;
-    simultaneous: see :func:`advance`."""
+    """A problem with data of the scheme.
+
+    active: (r, q) um2 mg/L at the start; watched: (n,) True at nodes that control the step; scale:
+    (s, 1) mg/L, of the concentrations; living: are F3 and F4 integrated?; simultaneous: see
+    :func:`advance`.
+    """
 
     problem: Problem
     active: np.ndarray
@@ -141,7 +155,7 @@ class System:
 
     @cached_property
     def sparse(self) -> ElementSystem:
-        """One substrate's unknowns: all triangles, then the pieces of biomass."""
+        """The system of one substrate: all triangles, then the pieces of biomass."""
         return coupled_system(self.space, bool(self.problem.system.constrained.any()), 1)
 
     @cached_property
@@ -173,7 +187,7 @@ class System:
 @timed("transport")
 @failing_as(TransportError)
 def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
-    """Compute steady profiles after a shape update: the scheme with F3 = F4 = 0, until C is steady.
+    """Compute steady profiles after a shape update: integrate with F3 = F4 = 0 until C is steady.
 
     Parameters
     ----------
@@ -186,8 +200,8 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     Returns
     -------
     Concentrations
-        C_A and C_D (n,), mg/L. The guess, if nothing can enter or leave the pore: no profile is
-        steady then.
+        C_A and C_D (n,), mg/L. The guess if nothing can enter or leave the pore, because no profile
+        is then steady.
 
     Raises
     ------
@@ -196,9 +210,10 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
 
     Notes
     -----
-    The transient does not matter (3.3.2): the steps are backward Euler's and grow to LONG as fast
-    as SETTLING permits. If a law is not monotone, the transient decides which state is reached.
-    Changes are then FASTER times smaller, and a step grows as its rate of change falls.
+    The transient does not matter (3.3.2). The steps are backward Euler's and grow to LONG as fast
+    as SETTLING permits. If a law of uptake is not monotone, the transient decides which steady
+    state is reached. Changes in a step are then FASTER times smaller, and the step grows as the
+    rate of change decreases.
     """
     start = _nearer(problem, guess)
     if not (problem.inflow.any() or problem.system.constrained.any()):
@@ -227,9 +242,12 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
 
 
 def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
-    """The guess, or C_supply everywhere if there is no guess or if constrained nodes would jump by
-    more than SETTLING. No step is short enough for a larger jump; quadratic concentrations beside
-    it would fall below zero."""
+    """The guess, or C_supply everywhere if there is no guess.
+
+    C_supply also replaces the guess if constrained nodes would jump by more than SETTLING. No step
+    is short enough for a larger jump, because quadratic concentrations beside it would become
+    negative.
+    """
     supplied = supplied_everywhere(problem)
     if guess is None:
         return supplied
@@ -259,8 +277,8 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
     fixed_step : float, optional
         Size (h) of steps without error control.
     simultaneous : bool
-        Does each substrate see the other's prediction, a possible reading of 3.3.1? It is less
-        accurate, and long steps may oscillate.
+        Does the uptake of each substrate use the prediction of the other one? This is a possible
+        reading of 3.3.1. It is less accurate, and long steps may oscillate.
 
     Returns
     -------
@@ -313,9 +331,12 @@ def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
 
 def _accepted(system: System, level: Level, step: float, tolerance: float, when: str,
               least: float) -> tuple[Level, float]:
-    """Make a step of at most ``step`` (h) that is positive and agrees with its prediction; also
-    returns its difference from the prediction over the scale. Each trial is shorter than the
-    previous one by a factor between ``least`` and 1/2."""
+    """Make a step of at most ``step`` (h) that stays positive and agrees with its prediction.
+
+    Also returns its largest difference from the prediction over the scale. Each trial is shorter
+    than the previous one by a factor between ``least`` and 1/2. Raises TransportError if the step
+    would be shorter than SHORTEST; when: names the time in the message.
+    """
     floor = _lowest(system.problem)
     shortest = min(SHORTEST, step)
     while step >= shortest:
@@ -329,8 +350,11 @@ def _accepted(system: System, level: Level, step: float, tolerance: float, when:
 
 def _tried(system: System, level: Level, step: float,
            floor: np.ndarray) -> tuple[Level, np.ndarray]:
-    """One step, and its difference from the prediction. If a concentration falls below zero and the
-    positive sink prevents it, or falls below ``floor``, the step uses the positive sink."""
+    """One step, and its difference (s, n) from the prediction over the scale.
+
+    The step uses the positive sink if a concentration is below zero without it, and if either the
+    positive sink prevents this or the concentration is below ``floor`` (s, 1).
+    """
     plain = _corrected(system, level, step, positive=False)
     fields = plain[0].fields
     if fields.min() >= 0:
@@ -345,7 +369,7 @@ def _lowest(problem: Problem) -> np.ndarray:
 
 
 def _factor(tolerance: float, size: float) -> float:
-    """Ratio of step sizes that brings a second-order difference just under the tolerance."""
+    """Ratio of step sizes that reduces a second-order difference to just below the tolerance."""
     return SAFETY * np.sqrt(tolerance / max(size, 1e-99))
 
 
@@ -359,13 +383,13 @@ def _too_short(system: System, new: Level, difference: np.ndarray, when: str) ->
     name = list(system.problem.substrates.modelled)[species]
     return TransportError(f"the {name} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in steps "
                           f"of {3600 * SHORTEST:g} s; try numerics.transport = "
-                          '"quasi_steady", which solves for the profiles at rest')
+                          '"quasi_steady", which solves for steady profiles')
 
 
 def _corrected(system: System, level: Level, step: float,
                positive: bool) -> tuple[Level, np.ndarray]:
-    """One step, and |C - C*| over the scale (s, n); positive: by backward Euler with the positive
-    form of the sink."""
+    """One step, and |C - C*| over the scale (s, n); positive: is the step backward Euler's with the
+    positive sink?"""
     ratio = step / level.step
     carry, weight = (0.0, 1.0) if positive else _formula(ratio)
     interval = weight * step
@@ -395,12 +419,12 @@ def _corrected(system: System, level: Level, step: float,
 
 
 def _formula(ratio: float) -> tuple[float, float]:
-    """Carry and weight of Gear's formula for the ratio of a step to the one before it."""
+    """Carry and weight of Gear's formula for the ratio of a step to the previous step."""
     return ratio**2 / (1 + 2 * ratio), (1 + ratio) / (1 + 2 * ratio)
 
 
 def _rates(system: System, fields: np.ndarray) -> tuple[Rate, Rate]:
-    """F3 / X_A and F4 / X_A (r, q) 1/h, zero where growth and decay are not integrated."""
+    """F3 / X_A and F4 / X_A (r, q) 1/h; zero if growth and decay are not integrated."""
     problem = system.problem
     if not system.living or problem.law is None:
         return 0.0, 0.0
@@ -418,8 +442,8 @@ def _unmet(system: System, active: np.ndarray, fields: np.ndarray) -> np.ndarray
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
           positive: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Slope and offset (r, q) of the uptake of substrate s linearised at the fields, slope C +
-    offset (um2 mg/L/h)."""
+    """Slope and offset (r, q) of the uptake of substrate s, linearised at ``fields``: the uptake is
+    slope C + offset (um2 mg/L/h)."""
     law = system.problem.law
     if law is None:
         return np.zeros_like(active), np.zeros_like(active)
@@ -434,8 +458,10 @@ def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
 
 def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np.ndarray,
             offset: np.ndarray) -> tuple[np.ndarray, tuple[float, float, float]]:
-    """C (n,) that solves M (C - past) / interval + L C - b + slope C + offset = 0; and the supply,
-    the outflow and the consumption."""
+    """C (n,) mg/L of M (C - past) / interval + L C - b + slope C + offset = 0.
+
+    Also returns supply, outflow and consumption, um2 mg/L/h.
+    """
     row = system.rows[s]
     sparse = system.sparse
     reaction = system.space.reaction

@@ -1,4 +1,4 @@
-"""Meshes that are graded to a front of the substrates in the aggregate."""
+"""Finer elements at the aggregate, if the mesh does not resolve a front of the substrates."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ MOST_GRADED = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Grading:
-    """How a pore is solved, and how it gets finer elements at its aggregate.
+    """Solver of a pore that makes finer elements at the aggregate if they are needed.
 
-    seeding: makes the pore again at t = 0; remeshing: gives it another mesh at later times, None
-    without growth, which has no later times.
+    seeding: makes the finer pore at t = 0; remeshing: makes the finer mesh at later times, None
+    without growth, because t = 0 is then the only time.
     """
 
     solver: Solver
@@ -53,8 +53,8 @@ class Grading:
                 pore = finer
 
     def finer(self, pore: Pore) -> Pore | None:
-        """The same pore on elements half as large at the aggregate; None if they may not be halved
-        again."""
+        """The same pore with elements half as large at the aggregate; None if elements may not be
+        halved again."""
         front = 2 * pore.front
         if not self.solver.scheme.follows_layers or front > MOST_GRADED:
             return None
@@ -67,16 +67,18 @@ class Grading:
         return remesh(rules, pore, replace(pore, front=front), 0.0)[0]
 
     def _as_seeded(self, pore: Pore) -> bool:
-        """Does a pore have the seeds of the scene, and has nothing moved them? It may instead have
-        outlines of its own, or a shape under the forces of the water."""
+        """Does a pore have the unmoved seeds of the scene?
+
+        Otherwise it has outlines from elsewhere, or fluid forces have deformed its aggregates.
+        """
         seeds = self.seeding.pore(pore.front).mesh.points
         return np.array_equal(seeds, pore.mesh.points)
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:
-    """Solve flow and substrates. If the mesh is too coarse for a front of the substrates, quadratic
-    elements get a mesh graded to it.
+    """Solve flow and substrates; also returns the pore, on a finer mesh if that was needed.
 
-    Raises Unresolved if no graded mesh resolves the front.
+    With quadratic elements, a finer mesh at the aggregate replaces a mesh that is too coarse for a
+    front of the substrates. Raises Unresolved if no accepted mesh resolves the front.
     """
     return Grading.of(scene).solve(pore)

@@ -10,7 +10,7 @@ from repro.model.pore import Pore
 
 
 def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> tuple[np.ndarray, ...]:
-    """Compute theta after growth: (28)-(29), from the increase of X_A + X_I over X_m.
+    """Compute theta after growth from the increase of X_A + X_I over X_m, (28)-(29).
 
     Parameters
     ----------
@@ -35,9 +35,11 @@ def compute_theta(previous: Pore, grown: Pore, maximum_density: float) -> tuple[
 
 
 def with_restarted_theta(pore: Pore, maximum_density: float) -> Pore:
-    """The pore with J times the density over X_m (mg/L) for theta, in the points where growth is
-    integrated: on straight triangles the mean density of their nodes (29), on curved ones that of
-    each point."""
+    """The pore with theta = J times the density over X_m (mg/L), where growth is integrated.
+
+    The density is the mean over the nodes of a straight triangle (29), or the value at each point
+    of a curved triangle.
+    """
     space = pore.space
     bodies = []
     for body, region in zip(pore.bodies, pore.mesh.regions):

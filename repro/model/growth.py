@@ -1,29 +1,30 @@
 """Growth mechanics (2.3, 3.4): the aggregate as an incompressible elastic body that grows.
 
-Plane strain, from the configuration of t = 0: F = d phi / d X, J = det F, tr C = F : F + 1.
+Plane strain relative to the configuration at t = 0: F = d phi / d X, J = det F, tr C = F : F + 1.
 The equilibrium makes this potential stationary in phi and P:
 
     Pi = integral of mu w(J^(-2/3) tr C) + P (J - theta) dV
          - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
 
 (14)-(17), (21)-(24) and (27), hence J = theta. Signs follow [E5]: the stabilisation makes the
-pressure block negative. Without tractions mu_L only scales P; this module sets it to 1. P is
-linear. The paper's energy is w = (I - 3) / 2; :mod:`repro.model.energies` has others, with a = 2
-dw/dI and c = 4 d2w/dI2. With A = a J^(-2/3), H = F^-T (dJ = J H : dF) and G = J^(-2/3) (F - tr C /
-3 H), first Piola-Kirchhoff stress and tangent are
+pressure block negative. Without tractions mu_L only scales P, so this module sets mu_L to 1. P is
+linear. The paper's energy is w = (I - 3) / 2. :mod:`repro.model.energies` has others, with
+a = 2 dw/dI and c = 4 d2w/dI2. With A = a J^(-2/3), H = F^-T (dJ = J H : dF) and
+G = J^(-2/3) (F - tr C / 3 H), the first Piola-Kirchhoff stress and the tangent are
 
     S = A (F - tr C / 3 H) + P J H
     dS = A (dF - 2/3 (H : dF) F - 2/3 (F : dF) H + 2/9 tr C (H : dF) H + tr C / 3 H dF^T H)
          + c (G : dF) G + P J ((H : dF) H - H dF^T H)
 
 *Straight triangles*, linear displacements. [E6]: h, grad and dv are those of the last known shape,
-and the modulus is the incremental one there, mu_tau = a mu_L theta^(-2/3); in reference quantities
-the stabilisation grows as J^(5/3) / a. It is kept fixed while an equilibrium is sought.
+and mu_tau = a mu_L theta^(-2/3) is the incremental modulus of this shape. In reference quantities
+the stabilisation grows as J^(5/3) / a. It does not change during the solution of an equilibrium.
 
-*Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma a
-theta^(-5/3) (J - theta) for P in S. This grad-div stabilisation vanishes where J = theta. Without
-it, modes of J that the linear pressure does not constrain would grow: at a constant shape the
-energy of plane expansion, J^(1/3) + J^(-2/3) / 2, is concave.
+*Curved triangles*, quadratic displacements (Taylor-Hood): the potential has no term in |grad P|^2.
+Instead S contains P + gamma a theta^(-5/3) (J - theta) in place of P. This grad-div stabilisation
+vanishes where J = theta. Without it, modes of J that the linear pressure does not constrain would
+grow, because the energy of a plane expansion without change of shape, J^(1/3) + J^(-2/3) / 2, is
+concave.
 """
 
 from __future__ import annotations
@@ -43,34 +44,37 @@ from repro.model.solid import Solid, Strained
 from repro.model.support import Support, balanced
 from repro.timing import timed
 
-#: Newton's method stops at this residual against the size of its terms.
+#: Newton's method stops at this residual relative to the size of its terms.
 NEWTON = 1e-11
-#: Or at this one, if round-off keeps the residual from falling.
+#: The method also stops at this residual, if round-off prevents a further decrease.
 ROUND_OFF = 1e-8
 MOST_ITERATIONS = 25
-#: (iterations, defect): the first try gives up if its defect is larger than this after so many
-#: iterations. In 19 pores this would have stopped three of 1240 solutions that converged. It saves
-#: half of the processor time of 117 that did not.
+#: (n, defect): the first attempt gives up if the defect after n iterations is larger. In 19 pores
+#: this would have stopped three of 1240 solutions that converged. It saves half of the processor
+#: time of 117 that did not.
 EARLY = 12, 0.02
-#: Halvings in a line search.
+#: Number of trial lengths in a line search: 1, 1/2, 1/4 ...
 HALVINGS = 8
-#: Sub-steps of a continuation, by ``patient``; an impatient caller shortens its step instead.
+#: {patient: numbers of sub-steps to try}. If not patient, the caller shortens its step instead.
 CONTINUATION = {True: (1, 8, 64), False: (1,)}
 #: gamma. The energy's curvature in J is never below -2/9 J^(-5/3), so gamma = 1 makes the energy
 #: convex with a margin.
 GAMMA = 1.0
-#: On curved triangles theta goes to its target in parts of at most this factor: a longer step of
-#: Newton's method may end in another equilibrium, with a wrinkled surface.
+#: On curved triangles theta goes to its target in sub-steps of at most this factor. A longer step
+#: of Newton's method may end in another equilibrium, with a wrinkled surface.
 FACTOR = 1.2
-#: FACTOR holds in this fraction of the aggregate's points: beside a contact line J may be far from
-#: theta in a few.
+#: FACTOR limits the sub-steps in this fraction of the aggregate's points. In a few points beside a
+#: contact line J may be far from theta.
 MOST_POINTS = 0.95
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """position: (n, 2) um; pressure: (corners,) P / mu_L; iterations: of Newton's method, over all
-    sub-steps."""
+    """An equilibrium.
+
+    position: (n, 2) um; pressure: (corners,) P / mu_L; iterations: of Newton's method, in all
+    sub-steps.
+    """
 
     position: np.ndarray
     pressure: np.ndarray
@@ -79,8 +83,11 @@ class Equilibrium:
 
 def internal_forces(solid: Solid, theta: np.ndarray, position: np.ndarray,
                     pressure: np.ndarray) -> np.ndarray:
-    """(n, 2) um, nodal forces of the stress over mu_L under theta (t, q), at positions (n, 2) um
-    and pressures (corners,). Equal external forces keep the aggregate there."""
+    """(n, 2) um, nodal forces of the stress over mu_L under theta (t, q).
+
+    position: (n, 2) um; pressure: (corners,) P / mu_L. External forces equal to these keep the
+    aggregate in this position.
+    """
     system = System(solid, np.zeros(position.shape, bool))
     if solid.shape.geometry == 1:
         system.stabilisation = PressureGradient.on(solid, position)
@@ -99,14 +106,17 @@ def cauchy(at: Strained, P: np.ndarray) -> np.ndarray:
 
 
 def largest_principal(stress: np.ndarray) -> np.ndarray:
-    """(...) largest principal value of stresses (..., 4) as :func:`cauchy` gives them."""
+    """(...) largest principal value of stresses (..., 4) as :func:`cauchy` returns them."""
     xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
     return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), zz)
 
 
 def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray,
                            theta: np.ndarray) -> np.ndarray:
-    """(t, 3, 3) matrices of sum_tau h^2 / (12 theta^(-2/3)) (grad p, grad q) on a shape [E6]."""
+    """(t, 3, 3) matrices of h^2 / (12 theta^(-2/3)) (grad p, grad q) in a shape [E6].
+
+    position: (n, 2) um, of the shape; theta: (t,) expansion.
+    """
     slopes = gradients(position, triangles)
     areas = triangle_areas(position, triangles)
     corner = position[triangles]
@@ -118,14 +128,14 @@ def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray,
 
 @dataclass(frozen=True, eq=False)
 class PressureGradient:
-    """Stabilisation on straight triangles; matrices: (t, 3, 3) of |grad P|^2."""
+    """Stabilisation on straight triangles; matrices: (t, 3, 3) of the term in |grad P|^2."""
 
     matrices: np.ndarray
     gamma = 0.0
 
     @staticmethod
     def on(solid: Solid, last_shape: np.ndarray) -> PressureGradient:
-        """The stabilisation on the last known shape (n, 2) um [E6]."""
+        """The stabilisation in the last known shape (n, 2) um [E6]."""
         expansion = solid.strained(last_shape).J[:, 0]
         matrices = gradient_stabilisation(last_shape, solid.shape.triangles, expansion)
         stiffness = solid.energy.growth_stiffness(expansion)
@@ -134,7 +144,7 @@ class PressureGradient:
 
     @staticmethod
     def parts(growth: np.ndarray) -> int:
-        """Sub-steps of a growth theta / J (t, q)."""
+        """Number of sub-steps for a growth theta / J (t, q): one."""
         return 1
 
 
@@ -147,17 +157,17 @@ class GradDiv:
 
     @staticmethod
     def on(solid: Solid, last_shape: np.ndarray) -> GradDiv:
-        """The stabilisation, which does not depend on the shape."""
+        """The stabilisation; it does not depend on the shape."""
         return GradDiv()
 
     @staticmethod
     def parts(growth: np.ndarray) -> int:
-        """Sub-steps of a growth theta / J (t, q), of at most FACTOR each in most points."""
+        """Number of sub-steps for a growth theta / J (t, q): each at most FACTOR in most points."""
         apart = np.quantile(np.abs(np.log(growth)), MOST_POINTS)
         return max(1, int(np.ceil(apart / np.log(FACTOR))))
 
 
-#: By the geometry of the triangles.
+#: {geometry of the triangles: stabilisation}.
 STABILISATIONS: dict[int, type[PressureGradient] | type[GradDiv]] = {1: PressureGradient,
                                                                      2: GradDiv}
 
@@ -165,8 +175,10 @@ Value = TypeVar("Value")
 
 
 class LastResult(Generic[Value]):
-    """A function of one array that keeps its last result until it is called with another array.
-    Arrays must not change in place."""
+    """A function of one array with a cache of the last result.
+
+    The cache is valid for the same array object, so arrays must not change in place.
+    """
 
     def __init__(self, function: Callable[[np.ndarray], Value]):
         self._function = function
@@ -180,9 +192,12 @@ class LastResult(Generic[Value]):
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """position: (n, 2) um; pressure: (corners,) P / mu_L; residual and the size of its terms; lag:
-    (n, 2) um, distances of prescribed coordinates to their targets; free: unknowns that are not
-    prescribed."""
+    """One Newton iterate.
+
+    position: (n, 2) um; pressure: (corners,) P / mu_L; residual, size: (2n + corners,) residual and
+    magnitude of its terms; lag: (n, 2) um, target minus position of prescribed coordinates; free:
+    unknowns that are not prescribed.
+    """
 
     position: np.ndarray
     pressure: np.ndarray
@@ -193,31 +208,31 @@ class Iterate:
 
     @property
     def defect(self) -> float:
-        """Largest residual against the size of its row's terms."""
+        """Largest residual of a free unknown, relative to the magnitude of its row's terms."""
         return relative(self.residual[self.free], self.size[self.free])
 
     @property
     def complete(self) -> bool:
-        """Do the prescribed coordinates have their values?"""
+        """Have the prescribed coordinates reached their targets?"""
         return not self.lag.any()
 
     @property
     def length(self) -> float:
-        """Length of the residual."""
+        """Euclidean norm of the residual of the free unknowns."""
         return float(np.linalg.norm(self.residual[self.free]))
 
 
 class System:
-    """Residual and tangent of Pi for one solid at one theta and prescribed coordinates."""
+    """Residual and tangent of Pi for one solid, one theta and prescribed coordinates."""
 
     def __init__(self, solid: Solid, constrained: np.ndarray, *,
                  stabilisation: PressureGradient | GradDiv = GradDiv(),
                  forces: np.ndarray | None = None, supports: Sequence[Support] = (),
                  system: ElementSystem | None = None):
         """constrained: (n, 2) True where a coordinate is prescribed; forces: (n, 2) um, nodal
-        forces over mu_L that do not depend on the shape (the t0 of (20)), none by default;
-        supports: of the contact surfaces, at points with prescribed x; system: the sparse system
-        without constraints, if it is known."""
+        forces over mu_L that do not depend on the shape (t0 in (20)), none by default; supports: of
+        the contact surfaces, at points with prescribed x; system: the sparse system without
+        constraints, if known."""
         self.solid = solid
         self.constrained = constrained
         self.supports = supports
@@ -253,13 +268,15 @@ class System:
         return self.stabilisation.gamma * theta ** (-5 / 3) * grown
 
     def _pressed(self, position: np.ndarray, pressure: np.ndarray) -> tuple[Strained, np.ndarray]:
-        """The deformation, and P with its stabilisation (t, q)."""
+        """The deformation, and P plus the grad-div stabilisation (t, q)."""
         at = self.strained(position)
         linear = self.solid.pressures.evaluate(pressure)
         return at, linear + self._stiffening(self.theta) * (at.J - self.theta)
 
     def residual(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-        """(2n + corners,): x of all nodes, y, then P of the corners. The caller ensures det F > 0.
+        """(2n + corners,) residual: x of all nodes, y of all nodes, then P of the corners.
+
+        The caller ensures det F > 0.
         """
         at, P = self._pressed(position, pressure)
         gap = self.solid.pressures.load(self.solid.at.dx * (at.J - self.theta))
@@ -279,7 +296,7 @@ class System:
         return np.concatenate([solid.at.assemble(forces), solid.pressures.assemble(gap)])
 
     def _sizes(self, position: np.ndarray) -> np.ndarray:
-        """Sizes of the terms of the residual."""
+        """(2n + corners,) magnitudes of the terms of the residual."""
         at = self.strained(position)
         weighted = self.solid.at.weighted
         positive = replace(weighted, gradients=np.abs(weighted.gradients))
@@ -321,7 +338,7 @@ class System:
         return saddle_blocks(K, -volume, self.stabilisation.matrices)
 
     def _pulled(self, tensor: np.ndarray) -> np.ndarray:
-        """(t, q, 2k) a tensor (t, q, 2, 2) times grad N_a: component x for every node a, then y."""
+        """(t, q, 2k) tensor (t, q, 2, 2) times grad N_a: component x for all nodes a, then y."""
         return (tensor @ self.solid.at.gradients).reshape(*self.solid.at.dx.shape, -1)
 
     def factored(self, iterate: Iterate) -> Factored:
@@ -335,8 +352,12 @@ class System:
         return Supported(factors.system, factors.elements, factors.solver, loads, points)
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """The longest of the steps 1, 1/2, ... to an admissible deformation that does not raise the
-        residual fourfold; the first step carries prescribed coordinates to their target."""
+        """The iterate after a step of Newton's method, of the longest accepted length 1, 1/2, ...
+
+        A length is accepted if the deformation is admissible and the residual grows by less than a
+        factor of four. Until prescribed coordinates have reached their targets, the step includes
+        their move, and the residual does not count. Raises GrowthError if no length is accepted.
+        """
         lag = iterate.lag
         carried = None
         if not iterate.complete:
@@ -378,15 +399,16 @@ def equilibrium(solid: Solid, theta: np.ndarray, position: np.ndarray, pressure:
     prescribed : (n, 2) float
         Prescribed coordinates, um.
     last : (n, 2) float, optional
-        The last known shape, um; the start by default.
+        The last known shape, um, for the stabilisation; ``position`` by default.
     forces : (n, 2) float, optional
         Nodal forces over mu_L, um; none by default.
     supports : sequence of Support, optional
-        Tractions that keep points with prescribed x in place; otherwise each point bears its force.
+        Tractions that keep points with prescribed x in place. Without a support, a force at the
+        point does so.
     modified_newton : bool
-        Does Newton's method keep its derivative while the defect falls fast enough?
+        Does Newton's method keep its derivative as long as the defect decreases fast enough?
     patient : bool
-        Is an equilibrium that fails tried again in more sub-steps?
+        Is a failed equilibrium tried again in more sub-steps?
 
     Returns
     -------
@@ -399,8 +421,8 @@ def equilibrium(solid: Solid, theta: np.ndarray, position: np.ndarray, pressure:
 
     Notes
     -----
-    The line search of Newton's method rejects det F <= 0. Where the method fails, theta and the
-    prescribed coordinates go to their targets in geometric sub-steps.
+    The line search of Newton's method rejects det F <= 0. If the method fails, theta goes to its
+    target in geometric sub-steps, and the prescribed coordinates in equal ones.
     """
     start = solid.strained(position).J
     if start.min() <= 0 or theta.min() <= 0:
@@ -414,15 +436,17 @@ def equilibrium(solid: Solid, theta: np.ndarray, position: np.ndarray, pressure:
     return reach(system, start, theta, first, prescribed, parts, modified_newton, patient)
 
 
-#: What helps if there is no equilibrium under the fluid's forces.
+#: Advice if there is no equilibrium under the fluid forces.
 TOO_SOFT = "; the aggregate may be too soft for this flow: try a larger growth.shear_modulus"
 
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
           prescribed: np.ndarray, parts: int = 1, modified_newton: bool = False,
           patient: bool = True) -> Equilibrium:
-    """Solve for equilibrium under theta, from J = ``start`` (t, q), in ``parts`` sub-steps, or in
-    more if these fail; see :func:`equilibrium`."""
+    """Solve for the equilibrium under theta in ``parts`` sub-steps, or in more if these fail.
+
+    start: (t, q) J of ``first``. Other arguments and errors are those of :func:`equilibrium`.
+    """
     failure = ""
     for steps in CONTINUATION[patient]:
         try:

@@ -1,10 +1,9 @@
-"""The form of the viscous term, which decides what is continuous at the interface [E2].
+"""The form of the viscous term. It determines what is continuous at the interface [E2].
 
-``numerics.interface`` chooses it; :func:`interface_of` alone knows its words. Both classes have
+``numerics.interface`` selects it by :func:`interface_of`. Both classes have
 
-    a                   element matrices (T, 2k, 2k) of a(u, v), x before y in rows and columns;
-                        (T, k, k) for each component if the two are not coupled. viscosity: (T,)
-                        nu_r
+    a                   element matrices (T, 2k, 2k) of a(u, v), x before y in rows and columns; or
+                        (T, k, k) for each component if they are not coupled. viscosity: (T,) nu_r
     rate                (..., 2, 2) viscous stress over nu, from grad u
     straight_outlet     is u_y = 0 at the outlet [E10]?
     bends               does the flow bend the aggregate about its contact lines? They then count as

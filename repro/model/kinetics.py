@@ -1,6 +1,6 @@
 """Kinetics (2.2): uptake of the substrates (7)-(8), growth and decay of biomass (9)-(10).
 
-With the fractions m_A(C_A) and m_D(C_D) of a law of uptake (:mod:`repro.model.uptake_law`):
+m_A(C_A) and m_D(C_D) are the fractions of a law of uptake (:mod:`repro.model.uptake_law`):
 
     F1 = -X_A m_A (k F m_D + d_c f_d b)        F3 = X_A m_A (k Y m_D - b)
     F2 = -k X_A m_A m_D                        F4 = X_A m_A b (1 - f_d)
@@ -9,18 +9,19 @@ With the fractions m_A(C_A) and m_D(C_D) of a law of uptake (:mod:`repro.model.u
 1.5138. So, for all fractions, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: donor becomes biomass, and decay
 takes up acceptor.
 
-A substrate that the scene does not model does not limit: its fraction is 1, and it has no equation.
-With kinetics.decay = "unlimited", biomass also decays where m_A is below 1, at a further rate
+A substrate that the scene does not model is not limiting: its fraction is 1, and it has no
+equation. With kinetics.decay = "unlimited", biomass also decays where m_A is below 1. The further
+decay adds
 
     F3: -X_A (1 - m_A) b        F4: X_A (1 - m_A) b (1 - f_d)
 
-The demand that no modelled substrate meets is *unmet*: that of a substrate that is not modelled,
-and the d_c f_d b (1 - m_A) X_A of the further decay. The identity above holds with the unmet demand
-added to -F1 and -F2.
+The *unmet* demand is the demand that no modelled substrate meets. It consists of the demand for a
+substrate that is not modelled, and of d_c f_d b (1 - m_A) X_A from the further decay. The identity
+above is valid with the unmet demand added to -F1 and -F2.
 
-Uptake and growth are functions of max(C, 0). Only the linearisation of the transient scheme uses
-the extension of a law below zero: the uptake of a substrate continues linearly below zero in its
-own concentration and takes the other one as zero.
+Uptake and growth are functions of max(C, 0). Only the linearisation of the transient scheme extends
+a law below zero: the uptake of a substrate is then linear in its own concentration, and a negative
+concentration of the other substrate counts as zero.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ from repro.fem.space import Space
 from repro.model.uptake_law import UptakeLaw, Values, uptake_law
 from repro.scene import Kinetics, Substrates
 
-#: Thickness of the thinnest front of zero order over the root of a triangle's area: 0.22 of the
-#: edge of an equilateral triangle. With 1/4, member 25 of `verification.problems.family` falls
-#: below zero by 0.15 % of the supply on elements that were halved twice.
+#: Least thickness of a front of zero order over the square root of a triangle's area: 0.22 of the
+#: edge of an equilateral triangle. With 1/4, a concentration in member 25 of
+#: `verification.problems.family` is below zero by 0.15 % of the supply on elements halved twice.
 THINNEST = 1 / 3
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +49,14 @@ class RateLaw:
     constants : Kinetics
         k, Y, b, f_d, d_c and F.
     both : UptakeLaw
-        The law of uptake of the modelled substrates at once.
+        The law of uptake of all modelled substrates.
     modelled : slice
-        Their places in (acceptor, donor).
+        Indices of the modelled substrates in (acceptor, donor).
 
     Notes
     -----
-    Concentrations are those of the modelled substrates, in this order, arrays or numbers, mg/L.
+    Methods take the concentrations (mg/L) of the modelled substrates in this order, as arrays or
+    numbers.
     """
 
     constants: Kinetics
@@ -62,11 +64,12 @@ class RateLaw:
     modelled: slice
 
     def on(self, space: Space, substrates: Substrates) -> RateLaw:
-        """The law in the parts of a space's reaction, whose elements resolve a sharp front.
+        """The law with half saturations K that a space's elements resolve, if the law is sharp.
 
-        A front of uptake q X_m is (D K / (q X_m))^1/2 thick: at least ``THINNEST`` times the root
-        of the area of its part, a triangle or that around a node. K / (2 C) is the square of this
-        thickness over the depth (2 D C / (q X_m))^1/2 that a concentration C reaches.
+        The front of an uptake q X_m has the thickness (D K / (q X_m))^1/2. K is chosen so that this
+        is ``THINNEST`` times the square root of the area of a triangle, or of the area around a
+        node. A concentration C penetrates to the depth (2 D C / (q X_m))^1/2. The square of
+        thickness over depth is K / (2 C).
         """
         if not self.both.sharp:
             return self
@@ -91,30 +94,30 @@ class RateLaw:
         return pair
 
     def uptake(self, *concentrations: Values) -> tuple[Values, Values]:
-        """-F1 / X_A and -F2 / X_A."""
+        """-F1 / X_A and -F2 / X_A (1/h)."""
         return self.uptake_at(*self.fractions(*concentrations))
 
     def growth_rate(self, *concentrations: Values) -> Values:
-        """F3 / X_A, net growth of active biomass (9)."""
+        """F3 / X_A (1/h), net growth of active biomass (9)."""
         return self.growth_at(*self.fractions(*concentrations))
 
     def inert_rate(self, *concentrations: Values) -> Values:
-        """F4 / X_A, inert remains of decay (10)."""
+        """F4 / X_A (1/h), inert remains of decay (10)."""
         m_a, _ = self.fractions(*concentrations)
         decay = m_a * self.constants.decay_coefficient + self.further_decay * (1 - m_a)
         return decay * (1 - self.constants.degradable_fraction)
 
     def growth_at(self, m_a: Values, m_d: Values) -> Values:
-        """F3 / X_A at the fractions."""
+        """F3 / X_A (1/h) at the fractions m_A and m_D."""
         return m_a * self.growth_per_acceptor(m_d) - self.further_decay * (1 - m_a)
 
     def uptake_at(self, m_a: Values, m_d: Values) -> tuple[Values, Values]:
-        """-F1 / X_A and -F2 / X_A at the fractions."""
+        """-F1 / X_A and -F2 / X_A (1/h) at the fractions m_A and m_D."""
         return m_a * self.per_acceptor(m_d), self.per_donor(m_a) * m_d
 
     def own_uptake(self, substrate: int, *concentrations: Values) -> tuple[Values, Values]:
-        """Uptake of a modelled substrate, extended below zero in its concentration, and the
-        derivative by this concentration; substrate: its place among the modelled ones."""
+        """Uptake of one substrate, extended below zero in its own concentration, and the derivative
+        by this concentration; substrate: its index among the modelled substrates."""
         fraction, slope = tuple(self.both)[substrate].extended(concentrations[substrate])
         m_a, m_d = self.fractions(*concentrations)
         is_acceptor = self.modelled.start + substrate == 0
@@ -122,8 +125,7 @@ class RateLaw:
         return fraction * per_own, slope * per_own
 
     def unmet_at(self, m_a: Values, m_d: Values) -> np.ndarray:
-        """(2, ...) the demand of acceptor and donor that no modelled substrate meets, per active
-        biomass (1/h)."""
+        """(2, ...) 1/h, unmet demand for acceptor and donor, per active biomass."""
         unmet = np.stack(self.uptake_at(m_a, m_d))
         unmet[self.modelled] = 0.0
         constants = self.constants
@@ -157,12 +159,12 @@ class RateLaw:
 
     @property
     def further_decay(self) -> float:
-        """The decay (1/h) without acceptor: b if decay is unlimited, else 0."""
+        """Rate (1/h) of the further decay at m_A = 0: b if decay is unlimited, else 0."""
         return self.constants.decay_coefficient if self.constants.decay == "unlimited" else 0.0
 
     @property
     def fastest_growth(self) -> float:
-        """k Y, growth at m_A = m_D = 1 without decay."""
+        """k Y (1/h), growth at m_A = m_D = 1 without decay."""
         return self.constants.maximum_utilization_rate * self.constants.yield_coefficient
 
 
@@ -172,7 +174,7 @@ def rate_law(substrates: Substrates, kinetics: Kinetics) -> RateLaw:
 
 
 def decay_demand(kinetics: Kinetics) -> float:
-    """d_c f_d b (1/h): the acceptor that decay takes up per active biomass at m_A = 1 [E3]."""
+    """d_c f_d b (1/h): uptake of acceptor by decay, per active biomass, at m_A = 1 [E3]."""
     return kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
 
 
@@ -184,7 +186,7 @@ def mean_growth(exponent: np.ndarray) -> np.ndarray:
 
 
 def mean_growth_slope(exponent: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Derivative by z of :func:`mean_growth`, whose value is ``mean``."""
+    """Derivative of :func:`mean_growth` by z; mean: value of :func:`mean_growth`."""
     small = np.abs(exponent) < 1e-4
     z = np.where(small, 1.0, exponent)
     return np.where(small, 0.5 + exponent / 3, (np.exp(z) - mean) / z)
@@ -192,10 +194,10 @@ def mean_growth_slope(exponent: np.ndarray, mean: np.ndarray) -> np.ndarray:
 
 def grow(active: np.ndarray, inert: np.ndarray, growth: np.ndarray, remains: np.ndarray,
          step: float) -> tuple[np.ndarray, np.ndarray]:
-    """(9)-(10) integrated exactly over a step (h) at constant rates: X_A grows by exp(growth step).
+    """Integrate (9)-(10) exactly over a step (h) at constant rates: X_A grows by exp(growth step).
 
-    active, inert: X_A, X_I, mg/L, or masses of them; growth, remains: F3/X_A and F4/X_A (1/h).
-    Returns the new X_A and X_I.
+    active, inert: X_A and X_I, as densities (mg/L) or masses; growth, remains: F3/X_A and F4/X_A
+    (1/h). Returns the new X_A and X_I.
     """
     mean = mean_growth(growth * step)
     return active * (1 + growth * step * mean), inert + active * mean * remains * step
@@ -203,24 +205,25 @@ def grow(active: np.ndarray, inert: np.ndarray, growth: np.ndarray, remains: np.
 
 @dataclass(frozen=True, eq=False)
 class Sink:
-    """Active biomass that takes up substrates, at an instant or while it grows over a time.
+    """Active biomass that takes up substrates, at one time or during a step.
 
-    active: (r, q) um2 mg/L, masses at the points of the reaction; duration: h, the time over which
-    it grows, or zero. Over a time the mean mass takes up substrates. It grows at the rates of the
-    concentrations being solved for, so that uptake and growth are one integral.
+    active: (r, q) um2 mg/L, masses at the points of the reaction, at the start of the step;
+    duration: h, of the step, zero for one time. During a step the mean mass takes up substrates.
+    The mass grows at the rates of the concentrations being solved for, so that uptake and growth
+    are one integral.
 
-    All methods are functions of the fractions of the modelled substrates, (s, r, q).
+    All methods are functions of the fractions (s, r, q) of the modelled substrates.
     """
 
     active: np.ndarray
     duration: float = 0.0
 
     def _exponent(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
-        """(r, q) growth of ln X_A over the time, at m_A and m_D."""
+        """(r, q) growth of ln X_A during the step, at m_A and m_D."""
         return self.duration * law.growth_at(*fractions)
 
     def _mass(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
-        """(r, q) um2 mg/L, the active mass, or its mean over the time, at m_A and m_D."""
+        """(r, q) um2 mg/L, the active mass, or its mean over the step, at m_A and m_D."""
         if self.duration == 0:
             return self.active
         return self.active * mean_growth(self._exponent(fractions, law))
@@ -232,7 +235,7 @@ class Sink:
         return self._mass(pair, law)[:, None] * np.stack(rates, axis=1)
 
     def unmet(self, fractions: np.ndarray, law: RateLaw) -> np.ndarray:
-        """(2,) um2 mg/L/h, the unmet demand of acceptor and donor."""
+        """(2,) um2 mg/L/h, the unmet demand for acceptor and donor."""
         pair = law.completed(fractions)
         return (self._mass(pair, law) * law.unmet_at(*pair)).sum(axis=(1, 2))
 

@@ -1,7 +1,7 @@
 """Equilibrium of a grown aggregate between the walls (2.3, 3.4): its loads and its constraints.
 
-A :class:`Closing` closes films and wedges (2.3.3). One subclass moves nodes
-(:mod:`repro.model.closing_by_nodes`), the other contact lines
+A :class:`Closing` closes films and wedges (2.3.3). One subclass joins nodes to a wall
+(:mod:`repro.model.closing_by_nodes`). The other subclass moves contact lines
 (:mod:`repro.model.closing_by_lines`).
 """
 
@@ -25,7 +25,7 @@ from repro.model.support import Support
 from repro.model.traction import Fluid
 from repro.scene import Growth, Numerics, Scene
 
-#: Largest number of rounds in which closing films change the contact surfaces in one step.
+#: Largest number of rounds in one step in which closing films change the contact surfaces.
 CONTACT_ROUNDS = 60
 
 
@@ -33,8 +33,8 @@ CONTACT_ROUNDS = 60
 class Mechanics:
     """Data from which the shape of a grown aggregate is computed.
 
-    keys: section [growth] of the scene; numerics: Newton's method; fluid:
-    its forces on the aggregate, None if they are neglected.
+    keys: section [growth] of the scene; numerics: section [numerics]; fluid: data of the fluid
+    forces, None if these are neglected.
     """
 
     keys: Growth
@@ -53,13 +53,12 @@ class Mechanics:
 class Expansion:
     """Aggregates in their new shapes.
 
-    pore: with the fluid's nodes not yet moved, on the divided mesh if a contact line lies
-    within an arc; iterations: of Newton's method; gaps: um, of the aggregate with the thinnest film
-    at a wall that it does not touch, this film in the old and in the new shape before films close;
-    divisions: one after the other, for each aggregate with lines within arcs; advances: {(number,
-    wall, direction): um} by which contact lines of an aggregate, by its place in the list, have
-    advanced along its grown outline; bisection: of the grown pore's mesh, before the divisions;
-    None if no triangle is bisected.
+    pore: with the new shapes. The fluid's nodes are not yet moved, and the mesh is divided if a
+    contact line lies within an arc; iterations: of Newton's method; gaps: um, thinnest film at a
+    wall without contact, in the old shape, and in the new shape before films close; divisions: in
+    their order, one for each aggregate with contact lines within arcs; advances: {(index of the
+    aggregate, wall, direction): um along its grown outline}; bisection: of the grown pore's mesh,
+    before the divisions; None if no triangle is bisected.
     """
 
     pore: Pore
@@ -78,22 +77,26 @@ class Expansion:
         return self.bisection.restricted(points) if self.bisection else points
 
     def joined(self, other: Expansion) -> Expansion:
-        """This expansion and then that of another aggregate in its pore."""
+        """This expansion followed by ``other``, the expansion of another aggregate in its pore."""
         gaps = min(self.gaps, other.gaps, key=lambda each: each[1])
         return Expansion(other.pore, self.iterations + other.iterations, gaps,
                          self.divisions + other.divisions, {**self.advances, **other.advances})
 
     def amounts(self, amounts: np.ndarray, grown: Pore) -> np.ndarray:
-        """Carry amounts (r, q) from the points of the grown pore's aggregates to those of the new
-        shapes. For expansions without a bisection."""
+        """Carry amounts (r, q) from the points of ``grown`` to the points of the new shapes.
+
+        The expansion must not have a bisection.
+        """
         parts = [grown.of(region, amounts) for region in grown.mesh.regions]
         for division in self.divisions:
             parts[division.number] = division.amounts(parts[division.number], grown.space.table)
         return self.pore.joined(parts)
 
     def gathered(self, loads: np.ndarray) -> np.ndarray:
-        """(n, 2) loads on the nodes of the grown aggregates, from those on the new shapes' nodes.
-        For expansions without a bisection."""
+        """(n, 2) loads on the nodes of the grown aggregates, from loads on the new shapes' nodes.
+
+        The expansion must not have a bisection.
+        """
         mesh = self.pore.mesh
         nodal = mesh.from_body(loads)
         for division in self.divisions[::-1]:
@@ -104,11 +107,12 @@ class Expansion:
 
 @dataclass(eq=False)
 class Closing(ABC):
-    """Closing of the films and wedges that are too thin while an aggregate takes its new shape.
+    """Closing of thin films and wedges while an aggregate takes its new shape.
 
-    grown: the pore with its new theta, in the old shape, seen from the aggregate; start: a pore on
+    grown: the pore with its new theta, in the old shape, focused on the aggregate; start: a pore on
     the same mesh with the shape and pressure from which the search starts; forces: (n, 2) um,
-    constant nodal forces on the aggregate over mu_L, None for no forces; search: its options.
+    constant nodal forces on the aggregate over mu_L, None for no forces; search: options of the
+    search for contact lines.
     """
 
     mechanics: Mechanics
@@ -119,15 +123,19 @@ class Closing(ABC):
 
     @abstractmethod
     def close(self) -> Expansion:
-        """The shape in which no film and no wedge is too thin. Raises GrowthError, and FirstContact
-        if the first contact comes too late for ``search``."""
+        """The shape in which no film and no wedge is too thin.
+
+        Raises GrowthError if there is no equilibrium or contact does not come to rest, and
+        FirstContact if the film at the first contact is thinner than ``search`` accepts.
+        """
 
 
 def equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarray | None, *,
                 last: np.ndarray | None = None, patient: bool = True) -> tuple[Pore, int]:
-    """Equilibrium of a grown pore under its theta, and the count of Newton iterations.
+    """Equilibrium of a grown pore under its theta, and the number of Newton iterations.
 
-    ``start`` has the contact, and the shape and pressure from which Newton's method starts.
+    start: a pore with the contact, and with the shape and pressure from which Newton's method
+    starts.
     """
     solid, target_J = grown.body.strained
     nodes = grown.region.nodes
@@ -142,9 +150,9 @@ def equilibrium(mechanics: Mechanics, grown: Pore, start: Pore, forces: np.ndarr
 
 
 def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 2) True where a coordinate is prescribed, and (n, 2) um, its prescribed value.
+    """(n, 2) True where a coordinate is prescribed, and (n, 2) um, positions with these values.
 
-    x is prescribed at fixed points, y on the walls (2.3.3). Every point that lay on a bonded wall
+    x is prescribed at fixed points, y on the walls (2.3.3). Every node that is on a bonded wall
     before the step keeps its position.
     """
     rim = shape.region.own_loop
@@ -162,8 +170,8 @@ def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
 def supports_of(solid: Solid, shape: Pore, forces: np.ndarray | None) -> list[Support]:
     """The supports of the contact surfaces of ``solid``, by :func:`surface_supports`.
 
-    Without ``forces`` (n, 2) one surface alone bears none, because the forces of growth along the
-    pore add up to zero.
+    Without ``forces`` (n, 2) a single sliding surface needs no support, because the forces of
+    growth along the pore add up to zero.
     """
     bearing = surface_supports(solid, shape)
     alone = len(bearing) == 1 and not any(wall.bonded for wall in shape.walls)
@@ -173,7 +181,7 @@ def supports_of(solid: Solid, shape: Pore, forces: np.ndarray | None) -> list[Su
 def surface_supports(solid: Solid, shape: Pore) -> list[Support]:
     """The supports of the contact surfaces of ``solid`` that slide and have a fixed point.
 
-    A surface of a single node has no length; the node bears its force.
+    A surface of a single node has no length and no support; a force at the node keeps it in place.
     """
     outline = shape.boundary
     rim = shape.region.own_loop
@@ -190,7 +198,7 @@ def surface_supports(solid: Solid, shape: Pore) -> list[Support]:
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """(count, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3).
 
-    rim: (M,) the boundary's nodes among all; wall, fixed: (M,), as in an outline.
+    rim: (M,) indices of the boundary's nodes; wall, fixed: (M,), as in an outline.
     """
     prescribed = np.zeros((count, 2), bool)
     prescribed[rim[fixed], 0] = True
@@ -199,7 +207,7 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
 
 
 def with_new_surfaces(pore: Pore) -> Pore:
-    """The pore with fixed points in the middles of contact surfaces that have just formed."""
+    """The pore with a fixed point in the middle of each new contact surface."""
     outline = pore.boundary
     fixed = outline.fixed
     for wall in pore.walls:
@@ -209,8 +217,10 @@ def with_new_surfaces(pore: Pore) -> Pore:
 
 
 def middle_of(outline: Outline, wall: int) -> np.ndarray:
-    """(M,) True at the node nearest to the middle of the contact surface with a wall; the corner
-    before it if that node is the middle of an arc."""
+    """(M,) True at the node nearest to the middle of the contact surface with a wall.
+
+    If this node is the middle of an arc, the corner before it is chosen.
+    """
     on = outline.wall == wall
     x = outline.points[:, 0]
     chosen = np.zeros(len(on), bool)

@@ -5,9 +5,9 @@ The displacement d of the fluid's corners solves a compressible pseudo-Stokes pr
     (grad d, grad v) - (P, div v) = 0
     (q, div d) + gamma (P, q) + sum_tau (tau grad P, grad q) = 0
 
-with linear functions and the flow's tau = h^2 / c. Interface nodes move with the biomass; corners
-of walls, inlet and outlet slide along their line. gamma is not printed [E13]. All edges of the
-fluid stay straight, except those at the interface.
+with linear functions and the flow's tau = h^2 / c. Interface nodes move with the biomass. Corners
+on walls, inlet and outlet slide along them. The paper prints no gamma [E13]. All edges of the fluid
+stay straight, except edges on the interface.
 """
 
 from __future__ import annotations
@@ -22,19 +22,20 @@ from repro.fem.space import Space
 from repro.model.flow import divergence, tau
 from repro.timing import timed
 
-#: gamma, not printed: with 0.1 to 10 the velocity of base changes by up to 0.1 % [E13].
+#: gamma, not printed. With 0.1 to 10 the velocity of base changes by up to 0.1 % [E13].
 COMPRESSIBILITY = 1.0
 
 
 def moved(mesh: Mesh, body: np.ndarray) -> Mesh:
-    """Move a mesh with its aggregate, whose nodes are at ``body`` (n, 2) um."""
+    """Move a mesh with its aggregates; body: (n, 2) um, new positions of the nodes ``mesh.body``.
+    """
     return mesh.moved(move(mesh, body, COMPRESSIBILITY))
 
 
 @timed("mesh motion")
 @failing_as(MeshError)
 def move(mesh: Mesh, body: np.ndarray, compressibility: float) -> np.ndarray:
-    """Move a mesh with the aggregate, (35).
+    """Move a mesh with its aggregates, (35).
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float) -> np.ndarray:
     Returns
     -------
     (N, 2) float
-        All nodes, um. Triangles may be turned over; the caller tests this.
+        New positions of all nodes, um. Triangles may be turned over; the caller tests this.
     """
     straight = mesh.straight
     points = mesh.points.copy()
@@ -62,8 +63,10 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float) -> np.ndarray:
 
 
 def _fluid_displacement(mesh: Mesh, prescribed: np.ndarray, gamma: float) -> np.ndarray:
-    """(f, 2) um, displacement of the fluid's corners; prescribed: (N, 2) um, displacement of the
-    aggregate, zero elsewhere."""
+    """(f, 2) um, displacement of the fluid's corners.
+
+    prescribed: (N, 2) um, displacement of the aggregates' corners, zero elsewhere.
+    """
     fluid = mesh.topology.fluid
     wet = ~mesh.biomass
     space = Space(mesh)
@@ -77,7 +80,7 @@ def _fluid_displacement(mesh: Mesh, prescribed: np.ndarray, gamma: float) -> np.
 
 
 def _system(mesh: Mesh) -> ElementSystem:
-    """The pseudo-Stokes system of the fluid's triangles, its unknowns numbered as ``fluid``."""
+    """The pseudo-Stokes system of the fluid's triangles, numbered as :attr:`Topology.fluid`."""
     fluid = mesh.topology.fluid
     triangles = np.searchsorted(fluid, mesh.triangles[~mesh.biomass])
     constrained = _constrained(mesh)[fluid]
@@ -85,8 +88,7 @@ def _system(mesh: Mesh) -> ElementSystem:
 
 
 def _constrained(mesh: Mesh) -> np.ndarray:
-    """(N, 2) True where x or y of a node is prescribed: in the aggregate, and across walls, inlet
-    and outlet."""
+    """(N, 2) True where x or y is prescribed: both in the aggregates, y on walls, x on the ends."""
     topology = mesh.topology
     constrained = np.zeros((len(mesh.points), 2), bool)
     constrained[np.concatenate([topology.inlet, topology.outlet]), 0] = True

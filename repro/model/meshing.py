@@ -30,20 +30,19 @@ from repro.scene import Aggregate, Growth, Numerics, Scene, Substrates, at_large
 from repro.scene import Flow as Drive
 from repro.scene import Pore as Channel
 
-#: Thinnest film to resolve (um, Table 1) without [growth], which states when a film closes.
+#: Thinnest film to resolve (um, Table 1) in a scene without growth.minimum_film.
 MINIMUM_FILM = 2.0
 #: The largest refinement that scenes accept.
 MOST_REFINED = 20.0
-#: Refinement of order 2 over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3) thick
-#: (Leveque). With four elements across the pore and this factor, concentrations upstream of an
-#: aggregate exceed the supply by less than 0.01 %.
+#: Refinement of quadratic elements over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3)
+#: thick (Leveque). With four elements across the pore and this factor, concentrations upstream of
+#: an aggregate exceed the supply by less than 0.01 %.
 BOUNDARY_LAYER = 0.15
-#: A mesh that resolves thinner layers has more nodes than 32-bit indices of sparse matrices count:
-#: more than the square of this.
+#: Largest refinement for layers. A finer mesh has more nodes, the square of this, than the 32-bit
+#: indices of sparse matrices can count.
 FINEST_LAYERS = 2.0**15.5
-#: By order of the elements: edges at the tips of an outline are the pore's width over this and over
-#: the square of the refinement (W / 200 in the presets paper and fast), but no shorter than W over
-#: ``MOST_AT_TIPS``.
+#: {order of the elements: divisor}. The edges at the tips of an outline have the length W /
+#: (divisor refinement^2) (W / 200 in the presets paper and fast), but at least W / MOST_AT_TIPS.
 AT_TIPS = {1: 200.0, 2: 5000.0}
 MOST_AT_TIPS = 20_000.0
 
@@ -55,31 +54,32 @@ def walls_of(scene: Scene) -> Walls:
 
 
 def seat_of(seed: Aggregate, walls: Walls) -> Wall:
-    """The wall on which a seed sits."""
+    """The wall of a seed."""
     return walls[("lower", "upper").index(seed.wall)]
 
 
 def whole_width_of(scene: Scene) -> float:
-    """W of a scene's pore (um), with the mirror image beyond a plane of symmetry."""
+    """Width (um) of a scene's pore: W, or 2 W if one wall is a plane of symmetry."""
     return whole_width(walls_of(scene))
 
 
 def film(scene: Scene) -> float:
-    """Thickness (um) at which a film closes, and the least that the mesh resolves."""
+    """Thickness (um) below which a film closes. It is also the thinnest film that a mesh resolves.
+    """
     return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
 
 
 def least_gap(scene: Scene) -> float:
     """Distance (um) of an aggregate from the opposite wall at which the film there closes."""
-    _, opposite = walls_of(scene)  # no aggregate sits on a plane of symmetry
+    _, opposite = walls_of(scene)  # an aggregate's own wall is never a plane of symmetry
     return film(scene) * opposite.part
 
 
 def resolution(scene: Scene) -> float:
     """Divisor of the element sizes outside films: ``numerics.refinement``, or more for layers.
 
-    The speed is the scene's mean velocity, or that of the clean channel under its head. Raises
-    MeshError if no mesh resolves the layers.
+    The layers follow from the largest mean velocity (:func:`fastest`). Raises MeshError if no mesh
+    resolves them.
     """
     if not (scene.numerics.scheme.follows_layers and scene.flow and scene.substrates):
         return scene.numerics.refinement
@@ -95,14 +95,15 @@ def _largest_peclet(scene: Scene) -> float:
 
 
 def peclet(substrates: Substrates, width: float, speed: float) -> float:
-    """u W / D with the smaller diffusivity, for a width (um) and a mean velocity (um/h)."""
+    """u W / D with the smallest diffusivity; width: W, um; speed: mean velocity u, um/h."""
     slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
                   for s in substrates.modelled.values())
     return speed * width / slowest
 
 
 def thin_layers(scene: Scene) -> str:
-    """Name the Peclet number of a scene with flow and substrates, and the keys that reduce it."""
+    """Text with the Peclet number of a scene with flow and substrates, and the keys that reduce it.
+    """
     by_head = "flow.head or flow.gravity, a larger flow.kinematic_viscosity"
     drive = needed(scene.flow, "a flow")
     other = "flow.rate" if drive.rate is not None else "flow.mean_velocity"
@@ -113,7 +114,8 @@ def thin_layers(scene: Scene) -> str:
 
 
 def fastest(drive: Drive, channel: Channel) -> float:
-    """Largest mean velocity (um/h) of a flow; under a head, that in the clean channel."""
+    """Largest mean velocity (um/h) of a flow. Under a head it is the velocity in a clean channel.
+    """
     largest = at_largest(drive)
     if largest.mean_velocity is not None:
         return largest.mean_velocity
@@ -125,7 +127,7 @@ def fastest(drive: Drive, channel: Channel) -> float:
 def sized(scene: Scene) -> Sizing:
     """Element sizes of a scene's meshes, without a front of the substrates.
 
-    Boundary layers refine all elements except those in films: a film is thinner than its layers.
+    Boundary layers refine all elements except in films, because a film is thinner than its layers.
     """
     least = film(scene)
     across = scene.numerics.contact_elements
@@ -138,10 +140,10 @@ def sized(scene: Scene) -> Sizing:
 
 @dataclass(frozen=True, eq=False)
 class Meshing:
-    """How the meshes of a scene are generated and moved.
+    """Data from which the meshes of a scene are generated and moved.
 
-    channel: section [pore] of the scene; sizes: of the elements, without a front; numerics: extent
-    and elements of a mesh, solver and constants of its motion.
+    channel: section [pore] of the scene; sizes: of the elements, without a front; numerics: section
+    [numerics], for the extent and the order of a mesh, and for the linear solver.
     """
 
     channel: Channel
@@ -187,15 +189,18 @@ class Meshing:
 
     def around(self, outlines: Sequence[Outline],
                front: float = 1.0) -> tuple[Mesh, list[Outline]]:
-        """Generate a mesh around aggregates, by :func:`repro.fem.mesher.generate_around`, with the
-        extent of 3.1; also return the outlines with their nodes on that mesh."""
+        """Generate a mesh around aggregates, with the extent of 3.1.
+
+        Also returns the outlines with their nodes on the mesh. See
+        :func:`repro.fem.mesher.generate_around`; front: as :attr:`Pore.front`.
+        """
         numerics = self.numerics
         sizes = replace(self.sizes, front=front)
         return mesher.generate_around(outlines, self.extent(outlines), sizes,
                                       numerics.scheme.order, Method(numerics.solver))
 
     def extent(self, outlines: Sequence[Outline]) -> tuple[float, float]:
-        """Ends (um) of a mesh around aggregates (3.1)."""
+        """x (um) of both ends of a mesh around aggregates (3.1)."""
         extents = [sizing.meshed_extent(outline, self.sizes.whole_width, self.channel.length,
                                         self.numerics.whole_pore)
                    for outline in outlines or (None,)]
@@ -204,7 +209,7 @@ class Meshing:
 
 
 def size_at_tips(numerics: Numerics, width: float) -> float:
-    """Length (um) of the edges at an outline's tips, in a pore of a width (um)."""
+    """Length (um) of the edges at an outline's tips; width: of the pore, um."""
     finest = min(AT_TIPS[numerics.scheme.order] * numerics.refinement**2, MOST_AT_TIPS)
     return width / finest
 
@@ -253,8 +258,11 @@ class Seeding:
         return self.around([outline] if outline else self.outlines(front), front)
 
     def around(self, outlines: Sequence[Outline], front: float = 1.0) -> Pore:
-        """The pore at t = 0 with aggregates in outlines; the seeds give the composition of each in
-        turn. If they are not as many, numbers are the names."""
+        """The pore at t = 0 with aggregates in ``outlines``.
+
+        Each aggregate has the composition of a seed, in turn. If the numbers of outlines and seeds
+        differ, the aggregates are named by numbers.
+        """
         mesh, outlines = self.meshing.around(outlines, front)
         space = Space(mesh)
         fractions = cycle([seed.inert_fraction for seed in self.seeds] or [0.0])
@@ -266,7 +274,7 @@ class Seeding:
 
     def _body(self, space: Space, region: Region, outline: Outline, fraction: float,
               name: str) -> Body:
-        """The aggregate of a region, with a fraction of inert biomass and a name."""
+        """The aggregate of a region; fraction: of inert biomass; name: in messages."""
         total = self.maximum_density * space.reaction.dx[space.integration.rows(region)]
         inert = total * fraction
         solid = material(space, region, space.mesh.points[region.nodes], energy_of(self.growth))

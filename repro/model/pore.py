@@ -28,9 +28,10 @@ class Pore:
 
     time: h; space: of velocity and concentrations, on the mesh; bodies: the aggregates, in the
     order of the mesh's regions, none in a clean channel; pressure: (corners,) P / mu_L of the
-    aggregate at each corner of the mesh, zero in the fluid; concentrations: the last known ones,
-    None before the first; front: divisor of the element sizes at the aggregates, for a front of the
-    substrates in them; focus: place in the list of the aggregate from which the pore is seen.
+    aggregates at each corner of the mesh, zero in the fluid; concentrations: the last computed
+    ones, None before the first solution; front: divisor of the element sizes at the aggregates, for
+    a front of the substrates in them; focus: index of the aggregate to which ``body``, ``region``,
+    ``boundary``, ``walls`` and ``with_body`` refer, None for the only one.
     """
 
     time: float
@@ -63,27 +64,27 @@ class Pore:
 
     @property
     def contact(self) -> bool:
-        """Does an aggregate touch all walls?"""
+        """Does an aggregate touch both walls, or its wall and another aggregate?"""
         return self.spanning > 0
 
     @property
     def spanning(self) -> int:
-        """Number of aggregates that touch all walls."""
+        """Number of aggregates that touch both walls, or their wall and another aggregate."""
         return sum(body.spans for body in self.bodies)
 
     @property
     def welded(self) -> bool:
-        """Are its two aggregates welded to each other?"""
+        """Are the two aggregates welded to each other?"""
         return any((body.wall == WELD).any() for body in self.bodies)
 
     @property
     def accumulates(self) -> bool:
-        """Does strain add up over the steps? Only then do folds and stresses have a meaning."""
+        """Does strain add up over the steps? Folds and stresses have a meaning only then."""
         return all(body.configuration.accumulates for body in self.bodies)
 
     @property
     def biot(self) -> float:
-        """Largest limit of Biot of the aggregates' energies; zero if none has a limit."""
+        """Largest of Biot's limits of the aggregates' energies; zero if none has a limit."""
         return max((body.solid.energy.biot or 0.0 for body in self.bodies), default=0.0)
 
     @cached_property
@@ -96,14 +97,14 @@ class Pore:
 
     @property
     def origin(self) -> np.ndarray:
-        """(N, 2) um, positions at t = 0 of the nodes' material; in the fluid, the present ones."""
+        """(N, 2) um, positions at t = 0 of the nodes' material; present positions in the fluid."""
         origin = self.mesh.points.copy()
         for body, region in zip(self.bodies, self.mesh.regions):
             origin[region.nodes] = body.reference
         return origin
 
     def name_of(self, number: int) -> str:
-        """An aggregate in messages, by its place in the list."""
+        """Name in messages of the aggregate with index ``number``."""
         name = self.bodies[number].name
         return "the aggregate" if len(self.bodies) == 1 and name == "1" else f"aggregate {name}"
 
@@ -114,11 +115,11 @@ class Pore:
         return replace(self, bodies=tuple(bodies))
 
     def of(self, region: Region, values: np.ndarray) -> np.ndarray:
-        """(r, q) values at the points of the reaction in one aggregate, from those in all."""
+        """(r, q) values at one aggregate's points of the reaction, from values at all points."""
         return values[self.space.integration.rows(region)]
 
     def joined(self, amounts: Iterable[np.ndarray]) -> np.ndarray:
-        """(r, q) amounts of all aggregates, from those of each."""
+        """(r, q) amounts at all points of the reaction, from amounts (r, q) of each aggregate."""
         total = np.zeros_like(self.space.reaction.dx)
         for amount, region in zip(amounts, self.mesh.regions):
             total[self.space.integration.rows(region)] = amount
@@ -130,27 +131,34 @@ class Pore:
         return replace(self, space=Space(self.mesh.moved(points)))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
-        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m: means over
-        curved triangles, or values at the nodes of straight ones. The constraint J = theta keeps
-        both near one; at single points of a curved triangle it does not."""
+        """Fraction of X_I in the biomass, and the least and the largest density over X_m.
+
+        Densities are means over curved triangles, or values at the nodes of straight triangles. The
+        constraint J = theta keeps these densities near X_m. It does not at single points of a
+        curved triangle.
+        """
         inert = self.inert
         area = self.space.reaction.dx.sum(axis=1)
         density = (self.active + inert).sum(axis=1) / area / maximum_density
         return float(inert.sum() / self.mass), float(density.min()), float(density.max())
 
     def focused(self, number: int | None) -> Pore:
-        """The pore seen from one aggregate, by its place in the list; None: from none."""
+        """The pore with its focus on the aggregate with index ``number``, or without a focus."""
         return replace(self, focus=number)
 
-    # The aggregate from which the pore is seen, or the only one.
+    # Members below refer to the aggregate in focus, or to the only one.
 
     @property
     def number(self) -> int:
-        """Its place in the lists. Raises MissingError in a clean channel."""
+        """Index of the aggregate in focus, or of the only one.
+
+        Raises MissingError in a clean channel, and ValueError if there are several aggregates and
+        no focus.
+        """
         if self.focus is not None:
             return self.focus
         if len(self.bodies) > 1:
-            raise ValueError(f"the pore has {len(self.bodies)} aggregates; focused(number) sees "
+            raise ValueError(f"the pore has {len(self.bodies)} aggregates; focused(number) selects "
                              "one of them")
         return 0 if self.bodies else needed(None, "an aggregate")
 
@@ -161,33 +169,33 @@ class Pore:
 
     @property
     def region(self) -> Region:
-        """Its region of the mesh."""
+        """Region of the aggregate in the mesh."""
         return self.mesh.regions[self.number]
 
     @property
     def outline(self) -> Outline | None:
-        """Its boundary, None in a clean channel."""
+        """Boundary of the aggregate, None in a clean channel."""
         return self.outlines[self.number] if self.bodies else None
 
     @property
     def boundary(self) -> Outline:
-        """Its boundary. Raises MissingError in a clean channel."""
+        """Boundary of the aggregate. Raises MissingError in a clean channel."""
         return needed(self.outline, "an aggregate")
 
     @property
     def walls(self) -> Walls:
-        """The walls that it sees: that of its seed, then the opposite one."""
+        """The wall of the aggregate's seed, then the opposite wall."""
         return self.body.seat.walls(self.mesh.walls)
 
     def with_body(self, **changes: Any) -> Pore:
-        """The pore with changes of its aggregate."""
+        """The pore with changed attributes of the aggregate."""
         bodies = list(self.bodies)
         bodies[self.number] = replace(self.body, **changes)
         return replace(self, bodies=tuple(bodies))
 
     def placed(self, position: np.ndarray, pressure: np.ndarray) -> Pore:
-        """The pore with its aggregate's nodes at positions (n, 2) um and pressures at its corners;
-        the other nodes stay in place."""
+        """The pore with new positions (n, 2) um and pressures (corners of the aggregate,) of the
+        aggregate. Other nodes stay in place."""
         points = self.mesh.points.copy()
         points[self.region.nodes] = position
         pressures = self.pressure.copy()

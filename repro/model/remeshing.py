@@ -30,10 +30,10 @@ from repro.scene import Scene, Substrate, Substrates, at_time
 
 @dataclass(frozen=True, eq=False)
 class Remeshing:
-    """Rules by which the mesh follows a growing aggregate and fields pass to a new mesh.
+    """Data from which the mesh follows growing aggregates, and fields are transferred.
 
     meshing: of the scene; transfer: method of :func:`biomass.transfer_amounts`; maximum_density:
-    X_m, mg/L; substrates: section of the scene, whose supplies may be tables over time.
+    X_m, mg/L; substrates: section of the scene. Its supplies may be tables over time.
     """
 
     meshing: Meshing
@@ -53,8 +53,8 @@ class Remeshing:
 class GeneratedMesh:
     """A mesh that a step has generated.
 
-    shape: the aggregate for which it was generated, on the mesh at the step's start; pore: the same
-    aggregate on the generated mesh.
+    shape: the aggregates for which the mesh was generated, on the mesh at the start of the step;
+    pore: the same aggregates on the generated mesh.
     """
 
     shape: Pore
@@ -62,26 +62,26 @@ class GeneratedMesh:
 
     @cached_property
     def at(self) -> Located:
-        """The generated mesh's aggregate in the triangles of the mesh at the step's start."""
+        """Location of the generated mesh's aggregate nodes in the mesh at the start of the step."""
         return _located_in(self.shape, self.pore.mesh)
 
 
 def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
              generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:
-    """Give an expanded aggregate a mesh: the present one, moved with it, or a new one.
+    """Give expanded aggregates a mesh: the present mesh, moved with them, or a new one.
 
     Parameters
     ----------
     rules : Remeshing
     previous : Pore
-        The pore before the aggregate took its new shape, on a good mesh.
+        The pore before the expansion, on an acceptable mesh.
     expanded : Pore
-        The new shape; the fluid's nodes are still in their old positions.
+        The new shapes; the fluid's nodes are still in their old positions.
     speed : float
-        Mean velocity, um/h, for the substrates beyond the old mesh's ends.
+        Mean velocity, um/h, for the substrates beyond the ends of the old mesh.
     generated : sequence of GeneratedMesh, optional
-        Meshes of the same step. If one of them, moved with its aggregate, is acceptable, no other
-        mesh is generated.
+        Meshes of the same step. The first one that is acceptable after it has moved with the
+        aggregates is used instead of a new mesh.
 
     Returns
     -------
@@ -91,8 +91,8 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
 
     Notes
     -----
-    The paper asks for a new mesh where the extent is too short (3.1) or the moved mesh would not be
-    acceptable (3.5). Two more cases need one: contact has changed, or an interface edge is more
+    In the paper, a new mesh is needed if the extent is too short (3.1) or the moved mesh is not
+    acceptable (3.5). Here it is also needed if contact has changed, or if an interface edge is more
     than twice as long as in a new mesh.
     """
     mesh = moved_mesh(rules.meshing, previous, expanded)
@@ -106,8 +106,11 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
 
 
 def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) -> Pore | None:
-    """An expanded aggregate on a mesh that its step has generated for another shape, moved with its
-    material; None if the contact differs or the moved mesh is not acceptable."""
+    """Expanded aggregates on a mesh that the same step has generated for other shapes.
+
+    The mesh moves with the material. Returns None if the contact differs or if the moved mesh is
+    not acceptable.
+    """
     shape, start = generated.shape, generated.pore
     old = expanded.mesh
     if old.topology is not shape.mesh.topology or not same_contact(expanded, shape):
@@ -125,13 +128,13 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
 
 
 def same_contact(pore: Pore, other: Pore) -> bool:
-    """Do the aggregates of two pores with the same nodes touch the walls with the same ones?"""
+    """Do the same nodes of the aggregates touch the same walls in both pores?"""
     return all(outline.same_contact(earlier)
                for outline, earlier in zip(pore.outlines, other.outlines))
 
 
 def _located_in(pore: Pore, mesh: Mesh) -> Located:
-    """The aggregates' nodes of a mesh in the biomass triangles of a pore of the same shape."""
+    """Location of a mesh's aggregate nodes in the biomass triangles of a pore of the same shape."""
     old = pore.mesh
     return transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
 
@@ -153,35 +156,35 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
 def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
            amounts: Amounts = (),
            outlines: Sequence[Outline] | None = None) -> tuple[Pore, Amounts]:
-    """Make a new mesh around the aggregates, with the extent of 3.1, and transfer all fields to it.
+    """Make a new mesh around the aggregates, with the extent of 3.1, and transfer all fields.
 
     Parameters
     ----------
     rules : Remeshing
     previous : Pore
-        The pore whose mesh has the concentrations.
+        The pore on the mesh of the concentrations.
     expanded : Pore
-        The aggregate and its biomass.
+        The aggregates and their biomass.
     speed : float
-        Mean velocity, um/h; zero where nothing flows and the whole pore is meshed, or where the
+        Mean velocity, um/h; zero if nothing flows and the entire pore is meshed, or if the
         substrates are only a first guess.
     amounts : tuple of (r, q) arrays, optional
-        Further amounts of the aggregate's material.
+        Further amounts in the biomass, um2 mg/L.
     outlines : sequence of Outline, optional
-        The same curves as those of ``expanded``, with other nodes.
+        The outlines of ``expanded`` with other nodes on the same curves.
 
     Returns
     -------
     pore : Pore
     amounts : tuple of (r, q) arrays
-        These amounts on the new mesh.
+        The further amounts on the new mesh.
 
     Notes
     -----
-    theta restarts as J times the density over X_m. This expansion brings each density back to X_m,
-    so that the next update removes the error of the constraint and it does not accumulate [E7].
-    Where strain adds up and shares are transferred, the new densities interpolate theta: J is rough
-    where strain is singular.
+    theta restarts as J times the density over X_m. This expansion brings each density back to X_m.
+    So the next update removes the error of J = theta, and the error does not accumulate [E7]. If
+    strain adds up and the transfer is "shares", the new densities follow from the interpolated
+    theta, because J is rough where strain is singular.
     """
     mesh, outlines = rules.meshing.around(outlines or expanded.outlines, expanded.front)
     new = Space(mesh)
@@ -193,9 +196,9 @@ def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
 
 
 def without(rules: Remeshing, pore: Pore, number: int, speed: float) -> Pore:
-    """The pore without an aggregate, by its place in the list, on a new mesh.
+    """The pore without the aggregate with index ``number``, on a new mesh.
 
-    Water takes its place. Stored substrates keep their concentrations there. speed: as for
+    Water replaces the aggregate. Stored substrates keep their concentrations. speed: as for
     :func:`remesh`.
     """
     mesh = pore.mesh
@@ -218,10 +221,11 @@ def without(rules: Remeshing, pore: Pore, number: int, speed: float) -> Pore:
 
 
 def within(rules: Remeshing, pore: Pore, outlines: Sequence[Outline], speed: float) -> Pore:
-    """The pore with its aggregates cut off at outlines within them, on a new mesh.
+    """The pore with its aggregates reduced to outlines within them, on a new mesh.
 
-    What is inside keeps its densities and its last shape. Its present shape is its reference from
-    now on, which loses no strain because new biomass has none. speed: as for :func:`remesh`.
+    The fraction of inert biomass and the last shape are transferred. The present shape becomes the
+    reference. No strain is lost, because strain counts from the last shape. speed: as for
+    :func:`remesh`.
     """
     mesh, outlines = rules.meshing.around(outlines, pore.front)
     new = Space(mesh)
@@ -237,7 +241,7 @@ def within(rules: Remeshing, pore: Pore, outlines: Sequence[Outline], speed: flo
 
 def _carried(rules: Remeshing, previous: Pore, expanded: Pore, new: Space,
              speed: float) -> Concentrations | None:
-    """The substrates of an expanded pore on a new mesh; arguments as in :func:`remesh`."""
+    """The substrates of an expanded pore on a new mesh; arguments are those of :func:`remesh`."""
     supplied = at_time(rules.substrates, expanded.time if speed else 0.0)
     return transfer_substrates(supplied, previous.space, new, expanded.concentrations, speed)
 
@@ -246,7 +250,8 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
                  amounts: Amounts = ()) -> tuple[Pore, Amounts]:
     """Transfer biomass, pressure, last shape and further amounts to the mesh of ``target``.
 
-    target: a pore of the same shape on another mesh; at: its aggregate's nodes in the old mesh.
+    target: a pore of the same shape on another mesh; at: location of its aggregate nodes in the old
+    mesh.
     """
     old = expanded.mesh
     active, inert, *rest = biomass.transfer_amounts(
@@ -270,11 +275,11 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
 
 
 def _masses(rules: Remeshing, expanded: Pore, target: Pore, at: Located) -> np.ndarray:
-    """(r, q) um2 mg/L, the biomass at the points of a new mesh if its density were X_m.
+    """(r, q) um2 mg/L, the biomass at the points of a new mesh at the density X_m.
 
-    Where strain adds up and shares are transferred, it is X_m times the interpolated theta, per
-    area at t = 0. Its sum over an aggregate is X_m times the present area. Arguments as in
-    :func:`_transferred`.
+    If strain adds up and the transfer is "shares", the biomass per area at t = 0 is proportional to
+    the interpolated theta. Its sum over an aggregate is X_m times the present area. Arguments are
+    those of :func:`_transferred`.
     """
     new = target.space
     areas = new.reaction.dx
@@ -291,7 +296,7 @@ def _masses(rules: Remeshing, expanded: Pore, target: Pore, at: Located) -> np.n
 
 
 def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
-    """(corners,) P / mu_L on a new mesh, interpolated in the aggregate, zero in the fluid."""
+    """(corners,) P / mu_L on a new mesh: interpolated in the aggregates, zero in the fluid."""
     old = expanded.mesh
     pressure = np.zeros(mesh.corners)
     inside = at.field(expanded.pressure, old.triangles[old.biomass])[mesh.body < mesh.corners]
@@ -301,10 +306,11 @@ def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
 
 def _on_new_mesh(new: Space, expanded: Pore, outlines: Sequence[Outline],
                  at: Located) -> tuple[Body, ...]:
-    """The aggregates on a new mesh, with the contact of their outlines there, and their positions
-    at t = 0: interpolated inside, those of the outline on its boundary.
+    """The aggregates on a new mesh, with the contact of their outlines.
 
-    If these positions fold, and strain does not count from them, the present shape replaces them.
+    Positions at t = 0 are interpolated inside, and are those of the outline on the boundary. If
+    they fold, the present shape replaces them, unless strain counts from t = 0. Then OriginFolded
+    is raised.
     """
     mesh = new.mesh
     old = expanded.mesh
@@ -329,11 +335,12 @@ def _on_new_mesh(new: Space, expanded: Pore, outlines: Sequence[Outline],
 
 def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Concentrations | None,
                         speed: float) -> Concentrations | None:
-    """C_A and C_D on a new mesh: interpolated within the old ends; beyond them (26) upstream, a
-    constant downstream, and the supply where nothing flows.
+    """C_A and C_D on a new mesh; state: on the old mesh.
 
-    supplied: the substrates at the time of the supply, without tables. Where nothing flows this is
-    t = 0, because the water beyond the old ends has been there since.
+    Within the old ends they are interpolated. Beyond them they follow (26) upstream and are
+    constant downstream; without flow they are the supply. supplied: the substrates at one time,
+    without tables. Without flow this time is t = 0, because the water beyond the old ends has been
+    there since t = 0.
     """
     if state is None:
         return None
@@ -350,8 +357,10 @@ def transfer_substrates(supplied: Substrates, old: Space, new: Space, state: Con
 
 def _beyond(field: np.ndarray, substrate: Substrate, x: np.ndarray, ends: tuple[float, float],
             speed: float) -> np.ndarray:
-    """(n,) mg/L: ``field`` with the values of (26) beyond the old ends, in place of those of the
-    nearest end."""
+    """(n,) mg/L: ``field`` with corrected values beyond the old ends (:func:`transfer_substrates`).
+
+    field: (n,) mg/L, with the value at the nearest end beyond the old ends.
+    """
     before = np.minimum(x - ends[0], 0.0)
     if speed == 0:
         return np.where((before < 0) | (x > ends[1]), substrate.supply, field)

@@ -2,13 +2,15 @@
 
 Both classes have
 
-    permeable           True: the water acts on the biomass by a drag in its volume; False: by a
-                        traction on its surface
-    contact_elements    least number of elements to the least film, beside upper contact lines
+    permeable           True: the water exerts a drag in the biomass; False: a traction on its
+                        surface
+    contact_elements    least number of elements per thickness of the least film, beside contact
+                        lines with the opposite wall
     pressure_jumps      does the pressure jump between water and biomass?
-    terms               the system with the conditions within biomass, nu_r (T,), and element
-                        matrices (T, 2k, 2k) of the drag
-    loss                head loss in a channel of a width (um) full of biomass, over that of water
+    terms               the system with the constraints in biomass, nu_r (T,), and element matrices
+                        (T, 2k, 2k) of the drag, None without drag
+    loss                head loss in a channel of a width (um) full of biomass, over the loss in
+                        water
 """
 
 from __future__ import annotations
@@ -35,16 +37,16 @@ class Viscous:
 
     @property
     def pressure_jumps(self) -> bool:
-        """It jumps with the viscosity."""
+        """Does the viscosity jump?"""
         return self.ratio != 1
 
     def terms(self, velocity: Space, system: ElementSystem
               ) -> tuple[ElementSystem, np.ndarray, None]:
-        """Viscosity alone."""
+        """The viscosity, without drag."""
         return system, np.where(velocity.mesh.biomass, self.ratio, 1.0), None
 
     def loss(self, width: float) -> float:
-        """That of Poiseuille's flow."""
+        """The ratio of the viscosities, by Poiseuille's flow."""
         return self.ratio
 
 
@@ -52,8 +54,8 @@ class Viscous:
 class Permeable:
     """Biomass with a permeability (um2); see :mod:`repro.model.brinkman`.
 
-    A permeable aggregate that spans the pore draws the water in at its upper contact lines, where
-    elements are therefore small.
+    Water enters a permeable aggregate that spans the pore near its contact lines with the opposite
+    wall. Elements are therefore small there.
     """
 
     permeability: float
@@ -69,7 +71,7 @@ class Permeable:
         return system.with_constrained(constrained), drag.viscosity, drag.matrices()
 
     def loss(self, width: float) -> float:
-        """Darcy's loss beside that of Poiseuille's flow."""
+        """One plus Darcy's loss over the loss of Poiseuille's flow."""
         return 1 + width**2 / 12 / self.permeability
 
 

@@ -23,8 +23,10 @@ from repro.model.energies import NEO_HOOKEAN, Energy
 
 @dataclass(frozen=True, eq=False)
 class Shape(Connections):
-    """Connections of the aggregate's own mesh, corners numbered first. degree: of the quadrature;
-    method: of the linear systems."""
+    """Connections of an aggregate's triangles, in its own numbering, corners first.
+
+    degree: of the quadrature; method: solver of the linear systems.
+    """
 
     degree: int
     method: Method = DEFAULT
@@ -32,17 +34,17 @@ class Shape(Connections):
 
     @property
     def table(self) -> Table:
-        """The displacements' functions where they are integrated."""
+        """The functions of the displacements at the quadrature points."""
         return elements.table(self.geometry, self.degree)
 
     @cached_property
     def unconstrained(self) -> ElementSystem:
-        """The sparse system of positions and pressure, nothing prescribed."""
+        """The sparse system of positions and pressure without prescribed unknowns."""
         constrained = np.zeros((int(self.cells.max()) + 1, 2), bool)
         return saddle_system(self.cells, self.triangles, constrained, method=self.method)
 
     def constrained(self, rows: np.ndarray) -> ElementSystem:
-        """The system with prescribed unknowns ``rows`` (2n + corners,). The last one is kept."""
+        """The system with prescribed unknowns ``rows`` (2n + corners,). The last one is cached."""
         last = self._constrained.get("last")
         if last is None or not np.array_equal(last.constrained, rows):
             last = self.unconstrained.with_constrained(rows)
@@ -53,8 +55,11 @@ class Shape(Connections):
 @brief
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """The aggregate in its reference configuration: positions (n, 2) um of its nodes, on the mesh
-    of ``shape``, and its elastic energy."""
+    """The aggregate in its reference configuration.
+
+    shape: its connections; reference: (n, 2) um, positions of its nodes; energy: its elastic
+    energy.
+    """
 
     shape: Shape
     reference: np.ndarray
@@ -62,7 +67,7 @@ class Solid:
 
     @cached_property
     def at(self) -> Basis:
-        """The displacements' functions in the reference configuration."""
+        """The functions of the displacements in the reference configuration."""
         cells = self.shape.cells
         return basis(cells, len(self.reference), self.reference[cells], self.shape.table)
 
@@ -73,14 +78,15 @@ class Solid:
         return Basis(self.shape.triangles, self.shape.corners, linear, self.at.dx)
 
     def strained(self, position: np.ndarray) -> Strained:
-        """The deformation (t, q, 2, 2) from the reference to positions (n, 2) um, with its terms in
-        the stress."""
+        """The deformation F (t, q, 2, 2) from the reference to positions (n, 2) um, and its terms
+        in the stress."""
         F = self.at.gradient(position)
         return Strained(elements.by_component(F.transpose(1, 3, 0, 2)), self.energy)
 
 
 def material(space: Space, region: Region, reference: np.ndarray, energy: Energy) -> Solid:
-    """An aggregate of a mesh; reference: (n, 2) um, its nodes in the reference configuration."""
+    """An aggregate of a mesh; reference: (n, 2) um, positions of its nodes in the reference
+    configuration."""
     shape = Shape(region.own_cells, len(region.corner_nodes), space.gradient_degree,
                   space.mesh.topology.method)
     return Solid(shape, reference, energy=energy)
@@ -88,8 +94,10 @@ def material(space: Space, region: Region, reference: np.ndarray, energy: Energy
 
 @dataclass(frozen=True, eq=False)
 class Strained:
-    """Plane deformations F (..., 2, 2) and their terms in the stress, each computed once, on first
-    use, so that J can be tested before a division by it."""
+    """Plane deformations F (..., 2, 2) and their terms in the stress.
+
+    Each term is computed on first use, so J can be tested before a division by J.
+    """
 
     F: np.ndarray
     energy: Energy = NEO_HOOKEAN
@@ -131,12 +139,14 @@ class Strained:
 
     @cached_property
     def G(self) -> np.ndarray:
-        """(..., 2, 2) J^(-2/3) (F - tr C / 3 H), half of the derivative of I by F."""
+        """(..., 2, 2) J^(-2/3) (F - tr C / 3 H): half of the derivative of I by F."""
         return self.isochoric[..., None, None] * (
             self.F - self.trace[..., None, None] / 3 * self.H)
 
     def piola(self, P: np.ndarray) -> np.ndarray:
-        """First Piola-Kirchhoff stress (..., 2, 2) at a pressure P (...), both over mu_L: the
-        derivative of (21) by F."""
+        """First Piola-Kirchhoff stress (..., 2, 2) at a pressure P (...), both over mu_L.
+
+        It is the derivative of (21) by F.
+        """
         volumetric = P * self.J - self.A * self.trace / 3
         return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H

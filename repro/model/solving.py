@@ -22,13 +22,13 @@ from repro.schemes import Scheme
 if TYPE_CHECKING:
     from repro.model.transport import Concentrations, Fluxes, Problem
 
-#: Under this Peclet number u W / D the supply of the inlet is round-off.
+#: Below this Peclet number u W / D the supply through the inlet is of the size of round-off.
 SLOWEST = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedSubstrates:
-    """The substrates in the geometry of a pore. No part is optional."""
+    """The substrates in the geometry of a pore; like :class:`Solved`, but no attribute is None."""
 
     problem: Problem
     concentrations: Concentrations
@@ -38,8 +38,10 @@ class SolvedSubstrates:
 @brief
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Flow and substrates in the geometry of a pore, and the fluxes of acceptor and donor; None
-    for parts that the scene does not model."""
+    """Flow and substrates in the geometry of a pore, and the fluxes of acceptor and donor.
+
+    An attribute is None if the scene does not model it.
+    """
 
     flow: Flow | None
     problem: Problem | None
@@ -63,8 +65,9 @@ class Solved:
 class Solver:
     """Data from which flow and substrates are solved.
 
-    channel: section [pore]; drive, substrates, kinetics: their sections, None if the scene leaves
-    them out, with tables over time; interface, scheme, transport: how they are solved.
+    channel: section [pore]; drive, substrates, kinetics: sections [flow], [substrates] and
+    [kinetics], None if the scene does not have them. Sections may have tables over time. interface,
+    scheme, transport: methods of solution.
     """
 
     channel: Channel
@@ -108,11 +111,11 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
     Parameters
     ----------
     scene : Scene
-        Its tables over time are read at the pore's time.
+        Its tables over time are evaluated at the time of the pore.
     pore : Pore
     over : float
-        Time (h) in which the biomass of ``pore`` grows at the rates being solved for; its mean
-        takes up the substrates.
+        Time (h) during which the biomass of ``pore`` grows at the rates being solved for. The mean
+        biomass over this time takes up the substrates.
 
     Returns
     -------

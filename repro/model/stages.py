@@ -1,4 +1,4 @@
-"""The parts of a scene that the stages of a step use, resolved once. No part is optional."""
+"""The data of a scene that the stages of a step use, without optional sections."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 class Stages:
     """The stages of a step of growth.
 
-    growth: section [growth] of the scene; tables: times at which steps end, and jumps; tolerance:
-    of a step; grading: flow and substrates, on a mesh that resolves them; mechanics: shape of the
-    grown aggregate; erosion: of its surface, None without it.
+    growth: section [growth] of the scene; tables: of the scene over time, with the times at which
+    steps end, and jumps; tolerance: numerics.tolerance of a step; grading: solves flow and
+    substrates on a mesh that resolves them; mechanics: computes the shape of grown aggregates;
+    erosion: of their surfaces, None without [growth.erosion].
     """
 
     growth: Growth
@@ -44,24 +45,24 @@ class Stages:
         _, _, growth = scene.growing
         erosion = None
         if growth.erosion:
-            from repro.model.erosion import Erosion  # a scene without it does not load it
+            from repro.model.erosion import Erosion  # a scene without erosion does not load it
             erosion = Erosion.of(scene)
         return cls(growth, scene.time_tables, scene.numerics.tolerance, Grading.of(scene),
                    Mechanics.of(scene), erosion)
 
     @property
     def solver(self) -> Solver:
-        """Of flow and substrates on the mesh of a pore."""
+        """Solver of flow and substrates on the mesh of a pore."""
         return self.grading.solver
 
     @property
     def remeshing(self) -> Remeshing:
-        """The mesh after a step."""
+        """Data for the mesh after a step."""
         return needed(self.grading.remeshing, "[growth]")
 
     @property
     def transport(self) -> TransportInTime:
-        """Substrates in time."""
+        """Method for the substrates in time."""
         return self.solver.transport
 
     @property
@@ -81,7 +82,7 @@ class Stages:
         return contact.expand(self.mechanics, grown, theta, guess, search)
 
     def without(self, pore: Pore, number: int, solved: Solved) -> Pore:
-        """The pore without one of its aggregates, by :func:`remeshing.without`."""
+        """The pore without the aggregate with index ``number``, by :func:`remeshing.without`."""
         return remeshing.without(self.remeshing, pore, number, solved.mean_velocity)
 
     def weld(self, pore: Pore, solved: Solved) -> Pore:
@@ -91,6 +92,6 @@ class Stages:
 
     def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved,
                  generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:
-        """Give an expanded aggregate a mesh, by :func:`remeshing.new_mesh`."""
+        """Give expanded aggregates a mesh, by :func:`remeshing.new_mesh`."""
         return remeshing.new_mesh(self.remeshing, previous, expanded, solved.mean_velocity,
                                   generated)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 def solve(supplied: Substrates, kinetics: Kinetics | None, scheme: Scheme,
           transport_in_time: TransportInTime, pore: Pore, flow: Flow | None,
           over: float) -> tuple[Problem, Concentrations, tuple[Fluxes, Fluxes]]:
-    """Solve the substrates of a section without tables in a pore.
+    """Solve the substrates in a pore.
 
-    kinetics: None without an aggregate. The flow and the time ``over`` (h) are those of
-    :func:`repro.model.solving.solve`.
+    supplied: section [substrates] at one time, without tables; kinetics: None without an aggregate;
+    flow: None without flow; over: h, as for :func:`repro.model.solving.solve`.
     """
     problem = transport.problem(pore.space, flow, supplied, kinetics, scheme)
     sink = Sink(pore.active, over) if kinetics else None
@@ -34,8 +34,10 @@ def solve(supplied: Substrates, kinetics: Kinetics | None, scheme: Scheme,
 
 
 def net_growth(problem: Problem, pore: Pore, state: Concentrations, constants: Kinetics) -> float:
-    """um2 mg/L/h, growth of X_A + X_I in all aggregates, F3 + F4 by the uptake and the unmet demand
-    (:mod:`repro.model.kinetics`)."""
+    """Growth (um2 mg/L/h) of X_A + X_I in all aggregates.
+
+    F3 + F4 follows from the uptake and the unmet demand (:mod:`repro.model.kinetics`).
+    """
     balance = transport.Balance(problem, Sink(pore.active))
     fields = state.fields.ravel()
     acceptor, donor = uptakes(problem, pore, state).sum(axis=0) + balance.unmet(fields)

@@ -1,18 +1,18 @@
-"""The traction that keeps a contact surface in place on a wall along which it slides (2.3.3).
+"""The traction that keeps a sliding contact surface in place (2.3.3).
 
-The middle point of each contact surface keeps its x. In plane strain a force at that point would
-indent the aggregate without limit as the mesh is refined. The wall therefore bears the force as a
-traction along the contact surface. The traction is uniform per length of the configuration from
-which strain counts. Where growth has doubled the surface's length, the traction is half as large;
-the modulus of this tissue has fallen, too. (A traction that is uniform along the present surface
-would shear the youngest and softest tissue most.) The traction's resultant m is the multiplier of
-the condition on x:
+The middle point of each contact surface keeps its x. In plane strain a force at this point would
+indent the aggregate without limit as the mesh is refined. The wall therefore exerts the force as a
+traction along the contact surface. The traction is uniform per length in the configuration from
+which strain counts. If growth has doubled a length, the traction there is half as large; the
+modulus of this tissue has also decreased. (A traction uniform along the present surface would shear
+the youngest and softest tissue most.) The resultant m of the traction is the multiplier of the
+condition on x:
 
     R + sum_k m_k L_k = 0,    x_k = given
 
 R are the nodal forces without the walls. L_k are the loads of a traction with the resultant 1 on
-the surface k: its shape functions, integrated over its length and divided by this length. They do
-not depend on the shape. Row k gives m_k = -R_k / L_kk.
+the surface k: the integrals of its shape functions, divided by its length. They do not depend on
+the present shape. Row k gives m_k = -R_k / L_kk.
 """
 
 from __future__ import annotations
@@ -38,8 +38,11 @@ class Support:
 
     @staticmethod
     def on(point: int, edges: np.ndarray, reference: np.ndarray) -> Support:
-        """The support of a surface with edges (e, 2 or 3), for nodes at ``reference`` (n, 2) um
-        before they are strained."""
+        """The support of a surface.
+
+        point: its fixed node; edges: (e, 2 or 3) nodes of its edges; reference: (n, 2) um,
+        positions in the configuration from which strain counts.
+        """
         nodes = edges.shape[1]
         _, slopes = edge_functions(nodes, np.linspace(0, 1, nodes))
         weights = ELEMENTS[nodes - 1].edge_weights
@@ -49,8 +52,8 @@ class Support:
 
 
 def balanced(supports: Sequence[Support], residual: np.ndarray) -> np.ndarray:
-    """A residual (2n + corners,), x of all nodes first, with the tractions that balance the rows of
-    the fixed points."""
+    """A residual (2n + corners,), x of all nodes first, plus the tractions of the supports. They
+    balance the rows of the fixed points."""
     residual = residual.copy()
     for support in supports:
         multiplier = residual[support.point] / support.load[support.point]

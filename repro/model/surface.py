@@ -1,8 +1,9 @@
-"""The elastic stretch along the aggregate's free surface, and the limits of a smooth equilibrium.
+"""The elastic stretch along the aggregate's free surface.
 
 It is the stretch of a material line along the surface, divided by J^(1/2). The stretch is relative
-to the configuration from which strain counts. The division removes the growth, which causes no
-stress by itself. An energy states its limits (:class:`repro.model.energies.Energy`).
+to the configuration from which strain counts. The division removes the growth, because growth alone
+causes no stress. The limits of a smooth equilibrium belong to the energy
+(:class:`repro.model.energies.Energy`).
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from repro.fem.walls import FREE
 from repro.model.body import Body
 from repro.model.pore import Pore
 
-#: Stretches closer to a contact line than this fraction of the free surface's length do not count:
-#: the stress at the line is singular.
+#: Stretches do not count if they are closer to a contact line than this fraction of the free
+#: surface's length, because the stress at the line is singular.
 BESIDE = 0.05
-#: Definition of the stretch for readers.
+#: Definition of the stretch, for reports.
 STRETCH = ("length along the surface over that in the configuration from which strain counts, over "
            "J^(1/2), in the middle of an edge")
 #: The middles of the edges 01, 12 and 20 of the unit triangle.
@@ -36,9 +37,10 @@ MIDDLES = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 class Surface:
     """The free edges of an aggregate's boundary.
 
-    stretch: (e,) elastic stretch along each of them, at its middle; middles: (e, 2) um; distance:
-    (e,) along the surface from the nearer contact line, over the length from line to line; cells:
-    (e,) their triangles, among those of the aggregate.
+    stretch: (e,) elastic stretch along each edge, at its middle; middles: (e, 2) um, of the edges;
+    distance: (e,) along the surface from the nearer contact line to the middle, over the length
+    from line to line; cells: (e,) indices of the triangles beside the edges among the aggregate's
+    triangles.
     """
 
     stretch: np.ndarray
@@ -62,22 +64,21 @@ class Surface:
         return x, y
 
 
-@lru_cache(maxsize=2)  # a row uses those of its own pore and those of the last step's
+@lru_cache(maxsize=2)  # a row uses its own pore and the pore of the last step
 @failing_as(GrowthError)
 def surfaces(pore: Pore) -> tuple[Surface, ...]:
-    """The free surfaces of a pore's aggregates, with their stretch since the configuration from
-    which strain counts."""
+    """The free surfaces of a pore's aggregates. Raises GrowthError on a floating-point error."""
     return tuple(_surface(pore.mesh, *each)
                  for each in zip(pore.bodies, pore.mesh.regions, pore.outlines))
 
 
 def surface(pore: Pore) -> Surface:
-    """The free surface of the aggregate from which the pore is seen, or of the only one."""
+    """The free surface of the aggregate in focus, or of the only one."""
     return surfaces(pore)[pore.number]
 
 
 def least_stretched(pore: Pore) -> Surface:
-    """The free surface with the least stretch."""
+    """The free surface with the least stretch among all aggregates."""
     return min(surfaces(pore), key=lambda surface: surface.least)
 
 
@@ -96,23 +97,29 @@ def _surface(mesh: Mesh, body: Body, region: Region, outline: Outline) -> Surfac
 
 
 def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """(edges,) area of triangles with nodes (edges, 3 or 6, 2) um over that of the unit triangle,
-    at the middles of their edges ``local`` (edges,)."""
+    """(edges,) um2, determinant of the map from the unit triangle, at the middle of an edge.
+
+    nodes: (edges, 3 or 6, 2) um, of the triangle beside each edge; local: (edges,) number of the
+    edge in this triangle.
+    """
     derivatives = elements.derivatives(elements.order_of(nodes), MIDDLES)
     return elements.determinant(np.einsum("eai,eak->eik", nodes, derivatives[local]))
 
 
 def _lengths(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """(edges,) um, chords of the edges. They give the stretch in the middle of an edge: the tangent
-    of a parabola there is parallel to its chord."""
+    """(edges,) um, lengths of the edges' chords; arguments as in :func:`_expansion`.
+
+    Their ratio is the stretch in the middle of an edge, because there the tangent of a parabola is
+    parallel to its chord.
+    """
     every = np.arange(len(nodes))
     chords = nodes[every, np.take(elements.NEXT, local)] - nodes[every, local]
     return np.linalg.norm(chords, axis=1)
 
 
 def _distances(lengths: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """(edges,) distance along the free surface from the middle of a free edge to the nearer end,
-    over the length of that surface."""
+    """(edges,) distance along a free surface from the middle of an edge to the nearer end of the
+    surface, over the length of the surface."""
     first = int(np.argmin(free))
     on = np.roll(free, -first)
     lengths = np.where(on, np.roll(lengths, -first), 0.0)

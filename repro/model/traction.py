@@ -1,23 +1,23 @@
 """Optional forces of the fluid on the aggregate, t0 and f0 of (20) and (22); 2.3.3 neglects them.
 
 The momentum balance of the fluid's triangles, tested with the nodal functions of the interface,
-gives the force on the fluid there; its opposite acts on the aggregate (consistent nodal forces).
-With head phi and velocity u,
+gives the force on the fluid there. The opposite force acts on the aggregate (consistent nodal
+forces). With head phi and velocity u,
 
     f_i = - integral over the fluid's triangles of sigma grad N_i
     sigma = rho nu grad u - rho g phi
 
-or rho nu (grad u + grad u^T) in the traction form [E2]. It is the form of the scene's flow, so that
-the forces on the aggregate, the walls and the ends add up to zero, to round-off. If hardly any
-water flows through the aggregate, both forms give the same traction, because u is about zero along
-the interface and div u = 0. At a contact line the force along the wall includes the shear of half
-an edge of wall. The force across it acts on the wall, where the aggregate's y is constrained. The
-zero of the head does not matter, because a uniform pressure has no effect on an incompressible body
-that touches only walls and fluid.
+In the traction form [E2] rho nu (grad u + grad u^T) replaces rho nu grad u. The scene's flow
+determines the form, so that the forces on the aggregate, the walls and the ends add up to zero, to
+round-off. If hardly any water flows through the aggregate, both forms give the same traction,
+because u is about zero along the interface and div u = 0. At a contact line the force tangential to
+the wall includes the shear on half an edge of the wall. The force normal to the wall acts on the
+wall, because y of the aggregate is constrained there. The zero of the head does not matter, because
+a uniform pressure has no effect on an incompressible body that touches only walls and fluid.
 
-Water within a permeable aggregate (section 5, :mod:`repro.model.brinkman`) takes over the stress of
-the water outside at the interface, and passes it to the biomass by its drag. The biomass has no
-traction on its surface; in its volume it has the body force
+In a permeable aggregate (section 5, :mod:`repro.model.brinkman`) the stress of the water is
+continuous at the interface, and the water transmits it to the biomass by its drag. The biomass has
+no traction on its surface. In its volume it has the body force
 
     f0 = rho nu u / k
 """
@@ -40,7 +40,7 @@ from repro.model.resistance import resistance_of
 from repro.scene import Flow as Drive
 from repro.scene import Scene, at_time, needed
 
-#: Distance of a shape from the mesh, over W, beyond which the mesh moves with it.
+#: The mesh moves to a new shape if their distance over W is larger than this.
 ROUND_OFF = 1e-14
 
 
@@ -48,9 +48,9 @@ ROUND_OFF = 1e-14
 class Surroundings:
     """The mesh in which the flow around a shape is solved. It may differ from the pore's mesh.
 
-    nodes: (k, a) for each aggregate node of ``mesh``, nodes in ``mesh.body`` of the pore's mesh;
-    share: (k, a) their weights. The position of the node is their weighted mean, and they share its
-    force by these weights.
+    nodes: (k, a) for each of the k aggregate nodes of ``mesh``, indices of a nodes in the pore's
+    ``mesh.body``; share: (k, a) weights of these nodes. The position of an aggregate node is the
+    weighted mean of theirs, and its force is distributed to them by the same weights.
     """
 
     mesh: Mesh
@@ -60,10 +60,10 @@ class Surroundings:
 
 @dataclass(frozen=True, eq=False)
 class Fluid:
-    """Data from which the fluid's forces on an aggregate are computed.
+    """Data from which the fluid forces on an aggregate are computed.
 
-    meshing: of the scene; drive: section [flow], whose head or mean velocity may be a table over
-    time; interface: form of the flow; shear_modulus: mu_L, MPa.
+    meshing: of the scene; drive: section [flow], which may have a table over time; interface: form
+    of the viscous term; shear_modulus: mu_L, MPa.
     """
 
     meshing: Meshing
@@ -80,7 +80,7 @@ class Fluid:
 
 
 def surroundings(meshing: Meshing, before: Pore, shaped: Pore) -> Surroundings:
-    """The mesh of ``before``, moved with the aggregate, or a new one if needed."""
+    """The mesh of ``before`` moved with the aggregates to ``shaped``, or a new mesh if needed."""
     mesh = before.mesh if shaped is before else remeshing.moved_mesh(meshing, before, shaped)
     if mesh is not None:
         nodes = np.arange(len(mesh.body))[:, None]
@@ -97,7 +97,7 @@ def _generated(meshing: Meshing, shaped: Pore) -> Surroundings:
 
 
 def follow(meshing: Meshing, around: Surroundings, shaped: Pore) -> Surroundings:
-    """The mesh ``around``, moved to another shape, or a new one if this turns a triangle over."""
+    """The mesh ``around`` moved to another shape, or a new mesh if a triangle is turned over."""
     mesh = around.mesh
     positions = shaped.mesh.points[shaped.mesh.body]
     places = np.einsum("ka,kai->ki", around.share, positions[around.nodes])
@@ -110,7 +110,7 @@ def follow(meshing: Meshing, around: Surroundings, shaped: Pore) -> Surroundings
 
 
 def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
-    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
+    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body``, by the flow around the shape."""
     mesh = around.mesh
     drive = at_time(fluid.drive, shaped.time)
     space = Space(mesh)
@@ -122,10 +122,10 @@ def forces(fluid: Fluid, around: Surroundings, shaped: Pore) -> np.ndarray:
 
 
 class SurroundingFlow:
-    """The flow around one shape after another of a grown pore.
+    """The flow around successive shapes of a grown pore.
 
-    The mesh moves with the shapes. The first shape gets a new mesh, and so does each shape whose
-    contact has changed.
+    The mesh moves from shape to shape. For the first shape, and for each shape whose contact has
+    changed, it is made again from the mesh of the grown pore (:func:`surroundings`).
     """
 
     def __init__(self, fluid: Fluid, grown: Pore):
@@ -135,7 +135,7 @@ class SurroundingFlow:
         self._around = surroundings(fluid.meshing, grown, grown)
 
     def forces(self, shaped: Pore) -> np.ndarray:
-        """:func:`forces` on a shape."""
+        """(n, 2) um, :func:`forces` on a shape."""
         meshing = self._fluid.meshing
         last = self._last
         self._last = shaped
@@ -148,8 +148,10 @@ class SurroundingFlow:
 
 def on_aggregate(space: Space, solution: Flow, drive: Drive,
                  interface: Interface) -> np.ndarray:
-    """(N, 2) um2 of head: forces of the water on the aggregate at all nodes, over rho g; traction
-    on its surface, or the drag within a permeable one."""
+    """(N, 2) um2 of head: forces of the water on the aggregates at all nodes, over rho g.
+
+    They are tractions on the surface, or the drag in a permeable aggregate.
+    """
     viscosity = drive.kinematic_viscosity / drive.gravity
     resistance = resistance_of(drive)
     if resistance.permeable:
@@ -158,7 +160,7 @@ def on_aggregate(space: Space, solution: Flow, drive: Drive,
 
 
 def seepage(space: Space, solution: Flow, drag: float) -> np.ndarray:
-    """(N, 2) um2 of head: forces of Darcy's drag within the aggregate, the f0 of (20), over rho g.
+    """(N, 2) um2 of head: forces of Darcy's drag in the aggregate, f0 in (20), over rho g.
 
     drag: nu_water / (g k), h/um.
     """
@@ -174,7 +176,7 @@ def seepage(space: Space, solution: Flow, drag: float) -> np.ndarray:
 
 def nodal(space: Space, solution: Flow, viscosity: float,
           interface: Interface) -> np.ndarray:
-    """(N, 2) um2 of head: forces of the fluid's triangles on all nodes of the mesh, over rho g.
+    """(N, 2) um2 of head: nodal forces of the fluid's triangles on all nodes, over rho g.
 
     viscosity: nu_water / g, um h.
     """

@@ -1,20 +1,20 @@
 """Substrates (2.2, 3.3): advection, diffusion and uptake of acceptor and donor, (7)-(13).
 
-For one substrate and every nodal function N_i, order 2 satisfies the conserving form
+For one substrate and every nodal function N_i, quadratic functions satisfy the conserving form
 
     (D grad C, grad N_i) - (C w, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass
         = <u_x C_supply, N_i>_inlet
 
-where w = u - grad psi has (w, grad N_i) = <u_x, N_i>_outlet - <u_x, N_i>_inlet for every N_i, so
-that C = C_supply is a solution where nothing is taken up. Linear functions satisfy, with the
-reaction lumped at the nodes,
+where w = u - grad psi has (w, grad N_i) = <u_x, N_i>_outlet - <u_x, N_i>_inlet for every N_i.
+Therefore C = C_supply is a solution without uptake. Linear functions satisfy, with the reaction
+lumped at the nodes,
 
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 
-where w = u - tau grad p is that velocity by :mod:`repro.model.flow`. Summed over i, either form is
-the balance: supply in = out + consumed, to round-off. Without flow both ends have the concentration
-C_supply, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed
-[E4], but the supply u_ave W C_supply then differs slightly from the inflow.
+where w = u - tau grad p has the same property (:mod:`repro.model.flow`). The sum of either form
+over i is the balance: supplied = out + consumed, to round-off. Without flow, both ends have the
+concentration C_supply ("open"), or no flux ("closed"). With u_ave in place of u_x at the inlet,
+(11) is as printed [E4], but the supply u_ave W C_supply then differs slightly from the inflow.
 """
 
 from __future__ import annotations
@@ -41,25 +41,25 @@ from repro.scene import Kinetics, Substrate, Substrates, needed
 from repro.schemes import PAPER, Scheme
 from repro.timing import timed
 
-#: Newton's method stops at this residual against the size of its terms.
+#: Newton's method stops at this residual relative to the size of its terms.
 NEWTON = 1e-13
-#: Or at this one, if round-off keeps the residual from falling.
+#: The method also stops at this residual, if round-off prevents a further decrease.
 ROUND_OFF = 1e-12
 MOST_ITERATIONS = 60
-#: No predicted saturation s is larger than this, so that C = K s / (1 - s) is finite.
+#: Upper limit of a predicted saturation s, so that C = K s / (1 - s) is finite.
 SATURATED = 0.9
-#: Above this saturation uptake is linearised about the concentration itself.
+#: Above this saturation, uptake is linearised about the actual concentration.
 SWITCH = 0.5
-#: A concentration below zero by more than this part of its supply is not resolved.
+#: A concentration is not resolved if it is below zero by more than this part of its supply.
 UNRESOLVED = 1e-3
-#: A concentration above its supply by more than this part of the supply is not resolved either.
+#: A concentration is not resolved if it is above its supply by more than this part of the supply.
 OVERSHOOT = 0.02
-#: Largest accepted concentration over its supply, by the order of the elements.
+#: {order of the elements: largest accepted concentration over its supply}.
 HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT}
-#: The uptake is not resolved if a quadrature of a degree higher by FINER differs by more than this.
-#: Both quadratures use the same concentrations, which are not solved for again with the finer one.
-#: In base with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was
-#: wrong by at most a hundredth of the largest difference.
+#: The uptake is not resolved if its relative difference from a quadrature of a degree higher by
+#: FINER is above APART. Both quadratures use the same concentrations. In base with fronts of half
+#: saturations from 1e-1 to 1e-6 of the supply, the error of the biomass made in 2 h was at most a
+#: hundredth of the largest difference.
 APART = 0.05
 FINER = 3
 
@@ -67,13 +67,13 @@ FINER = 3
 @brief
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """The s = 1 or 2 modelled substrates in one geometry, with n nodes in all and k a triangle.
+    """Equations of the s = 1 or 2 modelled substrates in one geometry, with n nodes.
 
-    matrices: (T, k, k) um2/h of each, without uptake; operator: (sn, sn) of all, not coupled, and
-    magnitude: its absolute entries; source: (sn,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
-    integrals of u_x N_i over an end; system: of all, coupled where there is biomass; law: None
-    without biomass; modified_newton: does Newton's method keep its derivative while the defect
-    falls fast enough?
+    matrices: for each substrate, (T, k, k) um2/h, without uptake; operator: (sn, sn) of all
+    substrates, uncoupled; magnitude: absolute values of its entries; source: (sn,) um2 mg/L/h;
+    inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of all substrates,
+    coupled in biomass; law: None without biomass; modified_newton: does Newton's method keep its
+    derivative as long as the defect decreases fast enough?
     """
 
     space: Space
@@ -105,15 +105,18 @@ class Problem:
 
     @property
     def supply(self) -> np.ndarray:
-        """(sn,) mg/L, of one substrate at all nodes, then of the other."""
+        """(sn,) mg/L, supply of one substrate at all nodes, then of the other substrate."""
         return np.repeat([s.supply for s in self.both], self.space.count)
 
 
 @brief
 @dataclass(frozen=True, eq=False)
 class Concentrations:
-    """C_A and C_D (n,) mg/L at the nodes of their space, None for a substrate that is not modelled,
-    and the iterations that they took."""
+    """Concentrations at the nodes of a space.
+
+    acceptor, donor: C_A and C_D (n,) mg/L, None if the substrate is not modelled; iterations: of
+    Newton's method.
+    """
 
     acceptor: np.ndarray | None
     donor: np.ndarray | None
@@ -149,12 +152,12 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     space : Space
         Space of the concentrations, and of the flow's velocity.
     flow : Flow, optional
-        None where nothing flows.
+        None without flow.
     substrates : Substrates
     kinetics : Kinetics, optional
         None without biomass.
     scheme : Scheme
-        Its inlet, carrier and Newton's method.
+        Determines inlet, carrier and Newton's method.
 
     Returns
     -------
@@ -185,8 +188,8 @@ def diffusion(space: Space, kind: Substrate) -> np.ndarray:
 
 def _through(space: Space, flow: Flow | None,
              scheme: Scheme) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(T, k, k) the advection, and the loads (n,) of the supply, the inflow and the outflow, um2/h;
-    zero without flow."""
+    """Advection (T, k, k) um2/h, and the loads (n,) um2/h of supply, inflow and outflow; all zero
+    without flow."""
     if flow is None:
         return np.zeros((1, 1, 1)), *np.zeros((3, space.count))
     u_x = flow.velocity[:, 0]
@@ -208,13 +211,13 @@ def mean_speed(flow: Flow) -> np.ndarray:
     return np.full(len(flow.velocity), flow.mean_velocity)
 
 
-#: The speed of (11), by the scheme's inlet.
+#: {inlet of the scheme: speed in (11)}.
 INLETS = {"local": local_speed, "mean": mean_speed}
 
 
 def advection(space: Space, flow: Flow, enters: np.ndarray, carrier: type[Carrier]) -> np.ndarray:
     """(T, k, k) um2/h of advection, with the conditions at inlet and outlet; enters: (n,) um/h, the
-    speed of (11)."""
+    speed in (11)."""
     if flow.correction is None:
         return _conserving(space, flow.velocity, carrier.quadratic(space, flow.velocity), enters)
     return _by_corners(space, carrier.linear(flow, flow.correction, space.mesh), enters)
@@ -235,7 +238,7 @@ class Carrier(ABC):
 
 
 class DivergenceFree(Carrier):
-    """w, whose divergence vanishes against every function of the space."""
+    """w; its divergence vanishes against every function of the space."""
 
     @staticmethod
     def linear(flow: Flow, correction: np.ndarray, mesh: Mesh) -> np.ndarray:
@@ -253,23 +256,25 @@ class Printed(Carrier):
 
     @staticmethod
     def linear(flow: Flow, correction: np.ndarray, mesh: Mesh) -> np.ndarray:
-        """u, which creates and consumes substrate where its divergence is not zero."""
+        """u, as printed. Substrate appears or vanishes where the divergence of u is not zero."""
         return flow.velocity[mesh.triangles]
 
     @staticmethod
     def quadratic(space: Space, velocity: np.ndarray) -> np.ndarray:
-        """u, with which a constant supply is no solution."""
+        """u, as printed. With u, a constant concentration is not a solution."""
         return space.at.evaluate(velocity.T)
 
 
-#: By the scheme's carrier.
+#: {carrier of the scheme: class}.
 CARRIERS: dict[str, type[Carrier]] = {"w": DivergenceFree, "u": Printed}
 
 
 def _conserving(space: Space, velocity: np.ndarray, carrier: np.ndarray,
                 enters: np.ndarray) -> np.ndarray:
-    """-(C w, grad v) with the carrier w (2, T, q), u_x C v over the outlet, and (u_ave - u_x) C v
-    over the inlet where (11) takes u_ave [E4]."""
+    """(T, k, k) um2/h of -(C w, grad v) plus <u_x C, v> over the outlet; carrier: (2, T, q) w.
+
+    If (11) contains u_ave [E4], <(u_ave - u_x) C, v> over the inlet is added.
+    """
     dofs = space.dofs
     u_x = velocity[:, 0]
     matrices = space.at.advection(carrier * -space.at.dx)
@@ -280,13 +285,14 @@ def _conserving(space: Space, velocity: np.ndarray, carrier: np.ndarray,
 
 
 def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
-    """(2, T, q) um/h of w = u - grad psi at the quadrature points, with psi of the space and
+    """(2, T, q) um/h of w = u - grad psi at the quadrature points, where psi in the space solves
 
-        (grad psi, grad v) = (u, grad v) + <u_x, v>_inlet - <u_x, v>_outlet    for all v of it.
+        (grad psi, grad v) = (u, grad v) + <u_x, v>_inlet - <u_x, v>_outlet    for all v.
 
-    So (w, grad v) is the flux through the ends for every v. The divergence of Taylor-Hood
-    velocities vanishes only against functions of one order less, so a constant carried by u is not
-    a solution. The exact velocity has psi = 0, and grad psi is no larger than the error of u.
+    So (w, grad v) is the flux through the ends for every v of the space. The divergence of
+    Taylor-Hood velocities vanishes only against functions of one order less. With u as carrier a
+    constant concentration is therefore not a solution. The exact velocity has psi = 0, and grad psi
+    is at most as large as the error of u.
     """
     at = space.at
     u = at.evaluate(velocity.T)
@@ -299,15 +305,17 @@ def divergence_free(space: Space, velocity: np.ndarray) -> np.ndarray:
 
 
 def _potential(space: Space) -> ElementSystem:
-    """The system of one function of the space, zero at one node of the outlet."""
+    """The system of psi, which is zero at one node of the outlet."""
     constrained = np.zeros(space.count, bool)
     constrained[space.dofs.outlet[0, 0]] = True
     return ElementSystem(space.cells, space.dofs.places, constrained, space.mesh.topology.method)
 
 
 def _by_corners(space: Space, w: np.ndarray, enters: np.ndarray) -> np.ndarray:
-    """(w . grad C, v) with w (T, 3, 2), linear on each triangle, and, lumped, u_x C v over the
-    inlet."""
+    """(T, 3, 3) um2/h of (w . grad C, v) plus the lumped <u_x C, v> over the inlet.
+
+    w: (T, 3, 2) um/h at the corners, linear on each triangle; enters: (n,) um/h, u_x in (11).
+    """
     mesh = space.mesh
     matrices = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
     loads = space.inlet.load(enters)
@@ -317,36 +325,36 @@ def _by_corners(space: Space, w: np.ndarray, enters: np.ndarray) -> np.ndarray:
 
 def _add_at(matrices: np.ndarray, beside: tuple[np.ndarray, np.ndarray],
             blocks: np.ndarray) -> None:
-    """Add matrices (E, e, e) of the edges of an end to those of the triangles beside them, in
-    place."""
+    """Add, in place, matrices (E, e, e) of an end's edges to those of the triangles beside them."""
     owner, place = beside
     np.add.at(matrices, (owner[:, None, None], place[:, :, None], place[:, None, :]), blocks)
 
 
 def _apart(space: Space, count: int) -> ElementSystem:
-    """The system of ``count`` substrates without uptake: all nodes of one substrate in their own
-    order, then those of the next."""
+    """The system of ``count`` uncoupled substrates: all nodes of one substrate, then the next."""
     size = count * space.count
     return ElementSystem(_shifted(space.cells, space, count), np.arange(size),
                          np.zeros(size, bool), space.mesh.topology.method)
 
 
 def _shifted(cells: np.ndarray, space: Space, count: int) -> tuple[np.ndarray, ...]:
-    """Cells of nodes as unknowns of each of ``count`` substrates."""
+    """For each of ``count`` substrates, its unknowns at the nodes ``cells``."""
     return tuple(k * space.count + cells for k in range(count))
 
 
 def coupled_system(space: Space, constrained: bool, count: int) -> ElementSystem:
-    """The system of ``count`` substrates with uptake; constrained: is the supply prescribed at the
-    ends?"""
+    """The system of ``count`` substrates, coupled by uptake; constrained: is the supply prescribed
+    at the ends?"""
     return space.mesh.topology.system(("transport", constrained, count),
                                       lambda: _system(space, constrained, count))
 
 
 def _system(space: Space, ends_constrained: bool, count: int) -> ElementSystem:
-    """Unknowns are numbered by node in elimination order, the substrates of a node side by side.
-    The first kinds of elements are the triangles of each substrate; the last kind is the pieces of
-    biomass, where the uptake couples the substrates."""
+    """The system of :func:`coupled_system`, with the substrates of a node eliminated together.
+
+    The first kinds of elements are the triangles of each substrate. The last kind are the pieces of
+    biomass, in which the uptake couples the substrates.
+    """
     constrained = np.zeros(space.count, bool)
     constrained[both_ends(space)] = ends_constrained
     coupled = np.concatenate(_shifted(space.reaction.cells, space, count), axis=1)
@@ -367,9 +375,13 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """All concentrations (sn,); the saturations (s, r, q) about which the uptake is linearised;
-    the residual at the concentrations and the size of its terms, um2 mg/L/h; consistent: do the
-    saturations follow from the concentrations?"""
+    """One Newton iterate.
+
+    state: (sn,) mg/L, all concentrations; saturations: (s, r, q), about which the uptake is
+    linearised; residual, size: (sn,) um2 mg/L/h, residual at the concentrations and magnitude of
+    its terms; free: unknowns that are not prescribed; consistent: are the saturations those of the
+    concentrations?
+    """
 
     state: np.ndarray
     saturations: np.ndarray
@@ -383,7 +395,7 @@ class Iterate:
 
     @property
     def defect(self) -> float:
-        """Largest residual of a free node against the size of its row's terms."""
+        """Largest residual of a free unknown, relative to the magnitude of its row's terms."""
         return relative(self.residual[self.free], self.size[self.free])
 
 
@@ -391,12 +403,13 @@ class Iterate:
 class Balance:
     """The equations of a problem with a sink, in the form that Newton's method needs.
 
-    Uptake is a function of max(C, 0) through the fractions m(C) of the law. Where half saturations
-    K are far below the supply this function is nearly a step, and Newton's method in C jumps from
-    one side of it to the other. Therefore each point of the reaction has its own saturation s, and
-    the uptake is linearised about C = K s / (1 - s). Above one half, s is the saturation of the
-    concentration, C / (C + K), which gives Newton's method in C. Below, s follows the linearisation
-    from 0 up, as in primal-dual active-set methods (Hintermueller, Ito and Kunisch 2002).
+    Uptake is a function of max(C, 0) through the fractions m(C) of the law. If half saturations K
+    are far below the supply, this function is nearly a step, and Newton's method in C jumps from
+    one side of the step to the other. Therefore each point of the reaction has its own saturation
+    s, and the uptake is linearised about C = K s / (1 - s). Above one half, s is the saturation of
+    the concentration, C / (C + K); this is Newton's method in C. Below one half, s follows the
+    linearisation, from 0 on, as in primal-dual active-set methods (Hintermueller, Ito and Kunisch
+    2002).
     """
 
     problem: Problem
@@ -407,7 +420,7 @@ class Balance:
         return self.problem.space.reaction
 
     def at(self, state: np.ndarray) -> np.ndarray:
-        """(s, r, q) concentrations in the points of the reaction."""
+        """(s, r, q) mg/L, concentrations at the points of the reaction; state: (sn,) mg/L."""
         return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))
 
     @property
@@ -424,24 +437,22 @@ class Balance:
         return self._law.both
 
     def uptake(self, state: np.ndarray) -> np.ndarray:
-        """(r, s, q) um2 mg/L/h."""
+        """(r, s, q) um2 mg/L/h, uptake at concentrations (sn,) mg/L."""
         return self._present_sink.uptake(self._both.fraction(self.at(state)), self._law)
 
     def unmet(self, state: np.ndarray) -> np.ndarray:
-        """(2,) um2 mg/L/h, the unmet demand of acceptor and donor."""
+        """(2,) um2 mg/L/h, the unmet demand for acceptor and donor."""
         return self._present_sink.unmet(self._both.fraction(self.at(state)), self._law)
 
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
-        """(sn,) um2 mg/L/h for all nodes and substrates (sn,), mg/L; loads: the uptake, if it is
-        known."""
+        """(sn,) um2 mg/L/h, residual at concentrations (sn,) mg/L; loads: the uptake, if known."""
         residual = self.problem.operator @ state - self.problem.source
         if self.sink is None:
             return residual
         return residual + self._reaction.assembled(self.uptake(state) if loads is None else loads)
 
     def sizes(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
-        """Sizes (sn,) of the terms of the residual, all taken as positive; loads: the uptake, if it
-        is known."""
+        """(sn,) um2 mg/L/h, magnitudes of the residual's terms; loads: the uptake, if known."""
         sizes = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
         if self.sink is None:
             return sizes
@@ -449,7 +460,7 @@ class Balance:
         return sizes + self._reaction.assemble(np.abs(loads) @ np.abs(self._reaction.values))
 
     def _slopes(self, state: np.ndarray, saturations: np.ndarray) -> np.ndarray:
-        """(s, r, q) ds/dC at the saturations; zero where there is no substrate."""
+        """(s, r, q) ds/dC at the saturations; zero where saturation and concentration are zero."""
         empty = (saturations <= 0) & (self.at(state) <= 0)
         return np.where(empty, 0.0, self._both.saturation_slope(saturations))
 
@@ -460,7 +471,7 @@ class Balance:
 
     def tangent(self, state: np.ndarray,
                 saturations: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-        """Element matrices, um2/h, of the residual's derivative: each substrate, then uptake."""
+        """Element matrices (um2/h) of the residual's derivative: each substrate, then uptake."""
         if self.sink is None:
             return *self.problem.matrices, self._coupled(None)
         if saturations is None:
@@ -469,7 +480,7 @@ class Balance:
         return *self.problem.matrices, self._coupled(by)
 
     def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
-        """(r, sk, sk) um2/h from the derivatives (s, s, r, q) of uptake i by concentration j."""
+        """(r, sk, sk) um2/h of the uptake; slopes: (s, s, r, q), of uptake i by concentration j."""
         count, k = self._reaction.cells.shape
         size = len(self.problem.both) * k
         if slopes is None:
@@ -490,8 +501,11 @@ class Balance:
         return self.problem.system.factored(self.tangent(iterate.state, iterate.saturations))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """Make a step of Newton's method. The sizes of the terms are computed for the first guess,
-        and again after the first step with each new derivative."""
+        """The iterate after a step of Newton's method.
+
+        The magnitudes of the terms are computed for the first iterate, and again in the first step
+        with each new derivative.
+        """
         state = iterate.state + factors.solve(-self._linearised(iterate))
         if self.sink is None:
             size = self.sizes(state) if fresh else iterate.size
@@ -513,14 +527,16 @@ class Balance:
         return self.residual(iterate.state, loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
-        """(s, r, q) saturations at other concentrations by the linearisation."""
+        """(s, r, q) saturations that the linearisation at ``iterate`` predicts for ``state``."""
         about = np.minimum(iterate.saturations, LARGEST_SATURATION)
         change = self.at(state) - self._both.concentration(about)
         return about + self._slopes(iterate.state, about) * change
 
     def _resaturated(self, iterate: Iterate, new: Iterate, concentrations: np.ndarray) -> Iterate:
-        """The new iterate with the saturations for the next linearisation; concentrations: those
-        of ``new`` in the points of the reaction."""
+        """The new iterate with the saturations for the next linearisation.
+
+        concentrations: (s, r, q) mg/L of ``new`` at the points of the reaction.
+        """
         actual = self._both.saturation(concentrations)
         if iterate.consistent and concentrations.min() > 0:
             return replace(new, saturations=actual)
@@ -557,14 +573,14 @@ def steady(problem: Problem, sink: Sink | None,
         If the method does not converge.
     Unresolved
         If the mesh is too coarse for a front: a concentration is below zero by more than UNRESOLVED
-        or above the supply by more than OVERSHOOT, in parts of the supply, or the uptake depends on
-        its quadrature.
+        of the supply, or above the supply by more than OVERSHOOT of the supply, or the uptake
+        depends on the quadrature.
 
     Notes
     -----
-    If the method fails, often behind a sharp front, it starts again from the supply with the half
-    saturations at the supply, and lowers them to their values by a factor of ten at a time. It does
-    not start again if the law is not monotone: several solutions may exist, and the one near the
+    The method may fail at a sharp front. It then starts again from the supply, with half
+    saturations equal to the supply, and reduces them to their values by factors of ten. If the law
+    is not monotone, it does not start again: several solutions may exist, and the solution near the
     guess is required.
     """
     sink = _acting(problem, sink)
@@ -585,7 +601,7 @@ def steady(problem: Problem, sink: Sink | None,
 
 @failing_as(TransportError)
 def _newton(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
-    """(sn,) the solution by Newton's method from a start, and its number of iterations."""
+    """(sn,) mg/L, the solution by Newton's method from ``state``, and the number of iterations."""
     newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.modified_newton)
     try:
         last, count, converged = newton.solve(balance, balance.begun(state))
@@ -604,7 +620,7 @@ def _front(failure: str) -> Unresolved:
 
 
 def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
-    """Newton's method with half saturations that fall from the supply to their own values."""
+    """Newton's method with half saturations that decrease from the supply to their values."""
     law = problem.rate_law
     supply = np.array([s.supply for s in problem.both])[:, None, None]
     sharpest = law.both.sharpness(supply).min()
@@ -618,7 +634,7 @@ def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.n
 
 
 def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrations:
-    """The solution. Raises Unresolved where it leaves the range from zero to the supply."""
+    """The solution. Raises Unresolved if it is not in the range from zero to the supply."""
     fields = state.reshape(len(problem.both), -1)
     for field, (name, substrate) in zip(fields, problem.substrates.modelled.items()):
         if field.min() < -UNRESOLVED * substrate.supply:
@@ -637,9 +653,12 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
 
 
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
-    """Relative difference of the uptake of the donor (of the acceptor, if it is alone) between the
-    quadrature and a finer one, at the same concentrations; the density of the biomass is linear in
-    each triangle and does not grow."""
+    """Relative difference of the uptake between the quadrature and a finer quadrature.
+
+    The uptake is that of the donor, or of the acceptor if the donor is not modelled. Both
+    quadratures use the same concentrations. The density of the biomass is linear in each triangle
+    and does not grow.
+    """
     reaction = problem.space.reaction
     finer, fit = problem.space.integration.finer(FINER)
     law = problem.rate_law
@@ -660,9 +679,12 @@ def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
 
 @dataclass(frozen=True)
 class Fluxes:
-    """Rates of one substrate per um of depth (um2 mg/L/h): supplied, out and consumed; its
-    flow-weighted concentrations (mg/L) at the inlet and the outlet of the mesh, or means over these
-    ends without flow; and its unmet demand. All but the last are zero if it is not modelled."""
+    """Rates and mean concentrations of one substrate.
+
+    supplied, out, consumed, unmet: um2 mg/L/h, per depth; inlet, effluent: mg/L, flow-weighted mean
+    concentrations at the inlet and the outlet of the mesh, or plain means without flow. If the
+    substrate is not modelled, only ``unmet`` is not zero.
+    """
 
     supplied: float
     out: float
@@ -673,7 +695,7 @@ class Fluxes:
 
 
 class Flows(NamedTuple):
-    """Amounts of acceptor and donor in the balance of a step, and their unmet demand, um2 mg/L."""
+    """Amounts (um2 mg/L) of acceptor and donor in the balance of a step, and their unmet demand."""
 
     supplied: tuple[float, float]
     out: tuple[float, float]
@@ -683,7 +705,7 @@ class Flows(NamedTuple):
 
 
 def integrated(duration: float, *instants: tuple[Fluxes, Fluxes]) -> Flows:
-    """Flows of steady substrates over a duration (h), from the mean of their fluxes."""
+    """Flows of steady substrates over a duration (h), from the mean of the fluxes ``instants``."""
     def total(part: str) -> tuple[float, float]:
         acceptor, donor = (sum(getattr(flux, part) for flux in fluxes) for fluxes in zip(*instants))
         return duration * acceptor / len(instants), duration * donor / len(instants)
@@ -692,8 +714,10 @@ def integrated(duration: float, *instants: tuple[Fluxes, Fluxes]) -> Flows:
 
 
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
-    """Ledger of the acceptor and of the donor in one geometry: supplied and out from the ends,
-    consumed from the uptake at the state."""
+    """Fluxes of acceptor and donor in one geometry.
+
+    Supplied and out are fluxes through the ends, consumed is the uptake at ``state``.
+    """
     space = problem.space
     both = state.fields
     out = both @ problem.outflow
@@ -722,7 +746,7 @@ def _acting(problem: Problem, sink: Sink | None) -> Sink | None:
 
 
 def _end_means(end: End, both: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """(s,) mg/L, means over an end, weighted with the flow through it if there is any."""
+    """(s,) mg/L, means over an end, weighted with the flow if there is any."""
     if not load.any():
         load = end.assembled(np.ones(end.count))
     return both @ load / load.sum()

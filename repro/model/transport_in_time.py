@@ -1,18 +1,17 @@
-"""How substrates change in time: at rest in each shape (2.2), or by the paper's transient (3.3).
+"""Substrates in time: steady in each shape (2.2), or by the paper's transient scheme (3.3).
 
-``numerics.transport`` chooses the method; :func:`transport_in_time` alone knows its words. Both
-classes have
+``numerics.transport`` selects the method by :func:`transport_in_time`. Both classes have
 
-    stores          True: the water keeps the substrates of earlier times. Balances then include
-                    them, they may exceed the present supply, and the next step starts from them.
+    stores          does the water store substrates of earlier times? If so, balances include the
+                    stored amounts, concentrations may exceed the present supply, and the next step
+                    starts from them.
     settled         steady concentrations in a shape, from a guess; see
                     :func:`repro.model.transport.steady`
-    make_biomass    integrates (9)-(10) over an update (h) in a fixed geometry: grown pore,
-                    concentrations, flows
-    growth_error    bound of the error (um2 mg/L) of the biomass made in an update. part: the
-                    fraction of ``biomass`` that turns over at the fastest rate; turnover: of the
-                    update, um2 mg/L; steepness: change of m_A + m_D for a change of the
-                    concentrations by their supplies
+    make_biomass    integrates (9)-(10) over an update (h) in a fixed geometry; returns the grown
+                    pore, concentrations and flows
+    growth_error    bound of the error (um2 mg/L) of the biomass made in an update. part: fraction
+                    of ``biomass`` that turns over at the fastest rate; turnover: in the update, um2
+                    mg/L; steepness: change of m_A + m_D if concentrations change by their supplies
 """
 
 from __future__ import annotations
@@ -25,20 +24,23 @@ if TYPE_CHECKING:
     from repro.model.solving import Solved
     from repro.model.transport import Concentrations, Flows, Problem
 
-#: Largest error of m(C) with Gear's method, over the change of m for a change by the supply: the
-#: tolerance of its concentrations.
+#: Relative tolerance of the concentrations in Gear's method. The largest error of m(C) is this
+#: times the change of m for a change of C by the supply.
 CONCENTRATION_TOLERANCE = 1e-3
 
 
 class QuasiSteady:
-    """Quasi-steady substrates; Heun's method for the biomass."""
+    """Quasi-steady substrates, with Heun's method for the biomass."""
 
     stores = False
 
     def settled(self, problem: Problem, sink: Sink | None,
                 guess: Concentrations | None) -> Concentrations:
-        """Newton's method. If a law of uptake is not monotone, several states may be steady. Gear's
-        method then leads from the guess to one of them, with the biomass at rest."""
+        """Steady concentrations by Newton's method.
+
+        If a law of uptake is not monotone, several states may be steady. Gear's method with
+        constant biomass then leads from the guess to one of them.
+        """
         from repro.model import transport  # a scene without [substrates] does not load it
         if problem.law is not None and not problem.law.both.monotone:
             guess = Gear().settled(problem, sink, guess)
@@ -46,8 +48,11 @@ class QuasiSteady:
 
     def make_biomass(self, previous: Pore, solved: Solved,
                      duration: float) -> tuple[Pore, Concentrations, Flows]:
-        """Each biomass grows exponentially at its rate. The second rates are those of the steady
-        concentrations over the grown biomass."""
+        """Grow the biomass exponentially at the mean of two rates.
+
+        The first rates are those at the start, the second ones those at the steady concentrations
+        with the biomass grown at the first rates.
+        """
         from repro.model.biomass import Rates, grow, rates
         from repro.model.kinetics import Sink
         from repro.model.transport import fluxes, integrated
@@ -63,8 +68,11 @@ class QuasiSteady:
         return grow(previous, mean, duration), end, integrated(duration, at_start, at_end)
 
     def growth_error(self, part: float, biomass: float, turnover: float, steepness: float) -> float:
-        """The trapezoidal rule errs by part^2 / 12 of the turnover: 1e-3 in a step of base, where
-        at most 2e-4 is measured (a tenth of the bound in the worst of 132 random scenes)."""
+        """Bound of the error of the trapezoidal rule: part^2 / 12 of the turnover.
+
+        In a step of base this is 1e-3; the largest measured error is 2e-4. In the worst of 132
+        random scenes the error is a tenth of the bound.
+        """
         return part**2 / 12 * turnover
 
 
@@ -75,7 +83,7 @@ class Gear:
 
     def settled(self, problem: Problem, sink: Sink | None,
                 guess: Concentrations | None) -> Concentrations:
-        """The transient, until it is steady."""
+        """The transient scheme, until it is steady."""
         from repro.model import gear  # most scenes need no transient
         return gear.settle(problem, sink, guess)
 
@@ -90,10 +98,12 @@ class Gear:
         return after, end.concentrations, end.flows
 
     def growth_error(self, part: float, biomass: float, turnover: float, steepness: float) -> float:
-        """Growth and uptake are integrated separately. Where a substrate runs out, m(C) errs by at
-        most CONCENTRATION_TOLERANCE supply / K. The bound is this part, and at least
-        CONCENTRATION_TOLERANCE, of the turnover at the fastest rate. Away from exhaustion at most
-        4e-4 is measured."""
+        """Bound of the error due to separate integrations of growth and uptake.
+
+        Where a substrate is exhausted, m(C) errs by at most CONCENTRATION_TOLERANCE supply / K. The
+        bound is this part, or CONCENTRATION_TOLERANCE if larger, of the turnover at the fastest
+        rate. Away from exhaustion the largest measured error is 4e-4.
+        """
         return CONCENTRATION_TOLERANCE * max(1.0, steepness) * part * biomass
 
 

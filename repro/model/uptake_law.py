@@ -1,8 +1,8 @@
 """Laws of uptake: the fraction m(C) by which a substrate limits uptake and growth in (7)-(10).
 
-A law is a subclass of :class:`UptakeLaw` and an entry of LAWS. It states m(C), dm/dC, the constants
-that it takes from a substrate, and bounds. The rates (7)-(10), Newton's method, Gear's scheme and
-`repro check` use it only through this class.
+A law is a subclass of :class:`UptakeLaw` and an entry of LAWS. It defines m(C), dm/dC, the
+constants that it takes from a substrate, and bounds. The rates (7)-(10), Newton's method, Gear's
+scheme and `repro check` use a law only through this class.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 
 from repro.scene import Kinetics, Substrate, Substrates
 
-#: A number, or an array of them: results have the same shape.
+#: A number or an array; results have the same shape.
 Values = TypeVar("Values", np.ndarray, float)
 
-#: C = K s / (1 - s) is evaluated at this s where round-off makes s = C / (C + K) one.
+#: Largest s at which C = K s / (1 - s) is evaluated; round-off may make s = C / (C + K) one.
 LARGEST_SATURATION = 1 - np.finfo(float).eps
 
 
@@ -29,12 +29,12 @@ class UptakeLaw:
     Parameters
     ----------
     half_saturation : float or (2, 1, 1) array
-        K, mg/L. Uptake is proportional to C far below it.
+        K, mg/L. For C far below K, uptake is proportional to C.
 
     Notes
     -----
-    Newton's method follows the saturation s = C / (C + K) in place of C. It rises from 0 to 1 with
-    C for every law, so that a law need not be monotone.
+    Newton's method uses the saturation s = C / (C + K) in place of C. For every law s increases
+    from 0 to 1 with C, so a law need not be monotone.
 
     Examples
     --------
@@ -46,9 +46,9 @@ class UptakeLaw:
 
     half_saturation: Any
 
-    #: Does m(C) never decrease? If it does, several concentrations may be steady.
+    #: Is m(C) nondecreasing? Otherwise several concentrations may be steady.
     monotone: ClassVar[bool] = True
-    #: Is m(C) a step in the limit, so that K follows the mesh?
+    #: Is m(C) a step in the limit, so that the mesh determines K?
     sharp: ClassVar[bool] = False
 
     @classmethod
@@ -77,14 +77,14 @@ class UptakeLaw:
 
     @classmethod
     def of(cls, *substrates: Substrate) -> UptakeLaw:
-        """Make the law of several substrates at once; its constants are (k, 1, 1) arrays."""
+        """Make one law for k substrates; its constants are (k, 1, 1) arrays."""
         columns = zip(*map(cls.constants, substrates))
         return cls(*(np.array(column)[:, None, None] for column in columns))
 
     def __iter__(self) -> Iterator[UptakeLaw]:
         """Iterate over the laws of the single substrates.
 
-        Their constants are numbers, or arrays (r, 1) if they differ between parts of a mesh.
+        Their constants are numbers, or arrays (r, 1) if the mesh determines them.
         """
         columns = [getattr(self, field.name) for field in fields(self)]
         for constants in zip(*columns):
@@ -195,7 +195,7 @@ class UptakeLaw:
         raise NotImplementedError
 
     def extended(self, concentration: Values) -> tuple[Values, Values]:
-        """Return m and dm/dC; below zero m continues along its tangent at zero."""
+        """Return m and dm/dC; below C = 0, m follows its tangent at zero."""
         slope = self.slope(concentration)
         return self.fraction(concentration) + np.minimum(concentration, 0.0) * slope, slope
 
@@ -224,20 +224,20 @@ class UptakeLaw:
         return self.fraction(concentration), slope
 
     def sharpness(self, supply: Values) -> Values:
-        """Return the part of the supply (mg/L) over which uptake falls to zero.
+        """Return the part of the supply (mg/L) over which uptake decreases to zero.
 
         It is K / supply, at most 1.
         """
         return self.half_saturation / np.maximum(supply, self.half_saturation)
 
     def softened(self, factor: float, supply: Values) -> UptakeLaw:
-        """Return the law with K larger by a factor, up to the supply (mg/L)."""
+        """Return the law with K multiplied by a factor, but not above the supply (mg/L)."""
         larger = np.minimum(factor * self.half_saturation, supply)
         return replace(self, half_saturation=np.maximum(self.half_saturation, larger))
 
 
 class Monod(UptakeLaw):
-    """Monod's law, m = C / (C + K): the fraction is the saturation itself."""
+    """Monod's law, m = C / (C + K): the fraction m equals the saturation s."""
 
     def fraction(self, concentration: Values) -> Values:
         """Return C / (C + K)."""
@@ -264,8 +264,8 @@ class Monod(UptakeLaw):
 class Haldane(UptakeLaw):
     """Haldane's law, m = C / (K + C + C^2 / K_i): the donor inhibits its own uptake.
 
-    inhibition: K_i, mg/L; infinite for the acceptor, whose law is Monod's. m has its maximum, 1 /
-    (1 + 2 (K / K_i)^1/2), at C = (K K_i)^1/2, and decreases beyond.
+    inhibition: K_i, mg/L; infinite for the acceptor, so that its law is Monod's. The maximum of m,
+    1 / (1 + 2 (K / K_i)^1/2), is at C = (K K_i)^1/2. Beyond, m decreases.
     """
 
     inhibition: Any
@@ -291,7 +291,7 @@ class Haldane(UptakeLaw):
         return rise / self._denominator(positive) ** 2
 
     def largest(self, supply: float) -> float:
-        """Return m at the maximum, for any supply."""
+        """Return the maximum of m, for any supply."""
         return 1 / (1 + 2 * np.sqrt(self.half_saturation / self.inhibition))
 
     def saturates(self, supply: float) -> bool:
@@ -300,7 +300,7 @@ class Haldane(UptakeLaw):
 
 
 class FirstOrder(UptakeLaw):
-    """Uptake of first order, m = C / K, without a bound: the limit of Monod's law far below K."""
+    """Uptake of first order, m = C / K, without a bound: the limit of Monod's law for C << K."""
 
     def fraction(self, concentration: Values) -> Values:
         """Return C / K."""
@@ -322,18 +322,18 @@ class FirstOrder(UptakeLaw):
 class ZeroOrder(UptakeLaw):
     """Uptake of zero order, the limit K -> 0 of m = 1 - exp(-C / K).
 
-    On a mesh, K is the least for which elements resolve the front (:meth:`RateLaw.on`). A layer
-    with C at its surface then takes up less than in the limit, by the part K / (2 C) of its uptake.
-    Without a mesh, K is K_s times LIMIT.
+    On a mesh, K is the least value for which elements resolve the front (:meth:`RateLaw.on`). The
+    uptake of a layer with C at its surface is then smaller than in the limit by the part K / (2 C).
+    Without a mesh, K is LIMIT times the scene's K_s.
     """
 
-    #: K over the scene's K_s without a mesh.
+    #: Ratio of K without a mesh to the scene's K_s.
     LIMIT: ClassVar[float] = 1e-5
     sharp: ClassVar[bool] = True
 
     @classmethod
     def constants(cls, substrate: Substrate) -> tuple[float, ...]:
-        """Return K (mg/L) without a mesh."""
+        """Return K (mg/L) for use without a mesh."""
         return (cls.LIMIT * substrate.half_saturation,)
 
     def fraction(self, concentration: Values) -> Values:
@@ -354,11 +354,11 @@ class ZeroOrder(UptakeLaw):
         return supply > self.half_saturation
 
 
-#: Laws by the values of `kinetics.law`.
+#: {value of `kinetics.law`: law}.
 LAWS: dict[str, type[UptakeLaw]] = {"dual Monod": Monod, "Haldane": Haldane,
                                     "first order": FirstOrder, "zero order": ZeroOrder}
 
 
 def uptake_law(substrates: Substrates, kinetics: Kinetics) -> UptakeLaw:
-    """Make a scene's law of uptake of its substrates."""
+    """Make the law of uptake of a scene's substrates."""
     return LAWS[kinetics.law].of(*substrates.modelled.values())

@@ -1,12 +1,13 @@
-"""Two aggregates that meet and weld: their surfaces join, and share their motion from then on.
+"""Welding of two aggregates: their surfaces join, and move together from then on.
 
-The welded aggregates are one elastic body with two references. They share the displacements and the
-pressure of the nodes of the weld, and each triangle keeps the reference and the theta of its own
-aggregate, so that both keep the strain that they had when they joined. A film between them closes
-as one at a wall does (2.3.3): it must be as thick as the least film, or as tan(angle) times the
-distance along its middle line from the line, whichever is less. Pairs of opposite nodes
-(:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. They go half of the
-way each, and then to equilibrium. Contact lines on walls advance by nodes, too.
+The welded aggregates are one elastic body with two references. They share the positions and the
+pressures of the nodes of the weld. Each triangle keeps the reference and the theta of its own
+aggregate, so both aggregates keep the strain that they had before. A film between them closes by
+the same rule as a film at a wall (2.3.3): the gap must be at least min(film, tan(angle) d), where d
+is the distance from the end of the weld along the middle line of the film. Pairs of opposite nodes
+(:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. The two nodes of a
+pair first move to the point half way between them, and then to equilibrium. Contact lines on walls
+advance by nodes too.
 """
 
 from __future__ import annotations
@@ -43,19 +44,22 @@ from repro.model.support import Support
 
 @dataclass(frozen=True, eq=False)
 class WeldedSolid(Solid):
-    """Welded aggregates; in_triangles: (t, k, 2) um, the reference of each triangle's nodes."""
+    """Welded aggregates; in_triangles: (t, k, 2) um, reference of each triangle's own nodes."""
 
     in_triangles: np.ndarray = field(kw_only=True)
 
     @cached_property
     def at(self) -> Basis:
-        """The displacements' functions in the references."""
+        """The functions of the displacements in the references."""
         return basis(self.shape.cells, len(self.reference), self.in_triangles, self.shape.table)
 
 
 def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float) -> Pore:
-    """The pore after two aggregates have met: they are welded over the least film's length on both
-    sides of the point where they are nearest. speed: as for :func:`remeshing.remesh`."""
+    """The pore after two aggregates have met and joined.
+
+    The weld extends by the thickness of the least film on each side of the nearest points. speed:
+    as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
+    """
     film = mechanics.keys.minimum_film
     first, second = pore.outlines
     outlines = welds.facing(first, second, film)
@@ -68,11 +72,12 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float) -> Po
 class Notch:
     """The water at one end of a weld.
 
-    pairs: (k, 2) nodes of the mesh that are opposite each other, from the line on; before:
-    (k, 2, 2) um, their places in the old shape; size: nodes from corner to corner; film, slope: the
-    least film (um) and the tangent of the least angle; joined: number of corners beyond the old
-    line that have joined; few, enough: largest number with which a film is too thin, and smallest
-    one with which none is; step: corners by which the next trial goes farther.
+    pairs: (k, 2) opposite nodes of the mesh, from the line on; before: (k, 2, 2) um, their
+    positions in the old shape; size: number of nodes from corner to corner; film: least film (um);
+    slope: tangent of the least angle; joined: number of pairs of corners beyond the old line that
+    have joined, in the present trial; few: largest number of pairs for which a film is too thin;
+    enough: smallest number for which no film is too thin; step: number of further pairs in the next
+    trial.
     """
 
     pairs: np.ndarray
@@ -93,8 +98,11 @@ class Notch:
         return self.pairs[: self.size * self.joined + 1]
 
     def advance(self, points: np.ndarray) -> None:
-        """Go to the next trial, with the nodes at places (N, 2) um: the search doubles its steps
-        until no film is too thin, and then halves the interval."""
+        """Go to the next trial; points: (N, 2) um, of the mesh in the present trial.
+
+        The search doubles its steps until no film is too thin. Then it halves the interval. Raises
+        GrowthError if there are no further pairs.
+        """
         if not self._too_thin(points):
             self.enough = self.joined
         else:
@@ -111,7 +119,7 @@ class Notch:
         self.step *= 2
 
     def _too_thin(self, points: np.ndarray) -> bool:
-        """Is a film thinner than the rule asks for? Close to the line less is asked for, as in
+        """Is a film thinner than the rule requires? Close to the line the rule requires less, as in
         :mod:`repro.model.contact_lines`."""
         free = self.pairs[self.size * self.joined:]
         one, two = _along_arcs(points[free])
@@ -129,8 +137,10 @@ class Notch:
 
 
 def _along_arcs(nodes: np.ndarray) -> np.ndarray:
-    """(2, p, 2) um, points along the arcs of both surfaces, from their nodes (k, 2, 2); the first
-    node, then PLACES of each arc."""
+    """(2, p, 2) um, points along both surfaces: the first node, then PLACES of each arc.
+
+    nodes: (k, 2, 2) um, of the arcs of both surfaces.
+    """
     arcs = np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1)
     points = np.einsum("ta,kasi->skti", AT_PLACES[1:], arcs).reshape(2, -1, 2)
     return np.concatenate([nodes[None, 0].swapaxes(0, 1), points], axis=1)
@@ -138,11 +148,11 @@ def _along_arcs(nodes: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """The nodes of all aggregates, those of a tied pair once.
+    """The nodes of all aggregates, with the two nodes of a tied pair as one.
 
-    nodes: (n,) of the mesh, ascending; number: (N,) place of each node of the mesh, or of the node
-    to which it is tied, among them; cells: (t, k) triangles in their numbering; corners: number of
-    corners among them.
+    nodes: (n,) nodes of the mesh, ascending; number: (N,) index in ``nodes`` of each node of the
+    mesh, or of the node to which it is tied; cells: (t, k) triangles as indices into ``nodes``;
+    corners: number of corners among ``nodes``.
     """
 
     nodes: np.ndarray
@@ -152,7 +162,7 @@ class Union:
 
     @staticmethod
     def of(mesh: Mesh, tied: np.ndarray) -> Union:
-        """The union of a mesh's aggregates with pairs (k, 2) that are tied."""
+        """The union of a mesh's aggregates; tied: (k, 2) pairs of nodes."""
         alias = np.arange(len(mesh.points))
         alias[tied[:, 1]] = tied[:, 0]
         cells = alias[mesh.cells[mesh.biomass]]
@@ -161,7 +171,7 @@ class Union:
                      int(np.count_nonzero(nodes < mesh.corners)))
 
     def summed(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """(n, ...) sums of values (k, ...) at nodes (k,) of the mesh; zero elsewhere."""
+        """(n, ...) sums at the union's nodes of values (k, ...) at nodes (k,) of the mesh."""
         total = np.zeros((len(self.nodes), *values.shape[1:]))
         np.add.at(total, self.number[nodes], values)
         return total
@@ -169,12 +179,12 @@ class Union:
 
 @dataclass(eq=False)
 class Welding:
-    """Closing of the film between two aggregates that are welded, or that have met.
+    """Closing of the film between two aggregates that are welded, or that have just met.
 
     grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
     shape and pressure from which the search starts; forces: (n, 2) um on the nodes of all
-    aggregates, over mu_L; reach: um, length on both sides of the point of the first contact that
-    joins, zero with a weld; patient: as in :class:`SearchOptions`.
+    aggregates, over mu_L, None for no forces; reach: um, half of the first length of the weld if
+    the aggregates have just met, zero otherwise; patient: as in :class:`SearchOptions`.
     """
 
     mechanics: Mechanics
@@ -189,7 +199,7 @@ class Welding:
         self._notches = [self._notch(walks) for walks in welds.notches(*self.grown.outlines)]
 
     def _notch(self, walks: Sequence[np.ndarray]) -> Notch:
-        """The notch whose nodes on both outlines are ``walks``."""
+        """The notch with the nodes ``walks`` on both outlines (:func:`welds.notches`)."""
         mesh = self.grown.mesh
         keys = self.mechanics.keys
         size = mesh.geometry
@@ -202,13 +212,13 @@ class Welding:
                      int(np.abs(lengths[0] - self.reach).argmin()))
 
     def equilibrium(self) -> Pore:
-        """The equilibrium with the weld and the contact of the start."""
+        """The equilibrium with the weld and the contact of ``start``."""
         return self._equilibrium(self.start, self._tied())
 
     def close(self) -> Expansion:
         """The shape in which no film between the aggregates and no wedge at a wall is too thin.
 
-        Raises GrowthError.
+        Raises GrowthError if there is no equilibrium or the weld does not come to rest.
         """
         shape = replace(self.grown, space=self.start.space, pressure=self.start.pressure)
         tied = np.empty((0, 2), int) if self.reach else self._tied()
@@ -228,14 +238,15 @@ class Welding:
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
 
     def _tied(self) -> np.ndarray:
-        """(k, 2) nodes of the pairs that have joined."""
+        """(k, 2) nodes of all pairs that have joined."""
         return np.concatenate([notch.tied for notch in self._notches])
 
     def _joined(self, shape: Pore, tied: np.ndarray) -> Pore:
         """The equilibrium after further pairs have joined half way between their nodes.
 
-        tied: (k, 2) pairs that have joined before. If the triangles beside the others are too
-        small for this, their aggregates first take the equilibrium with them at these places.
+        tied: (k, 2) pairs that had joined before. If this fails because the triangles beside the
+        new pairs are too small, the new pairs are first prescribed half way, and the aggregates
+        take the equilibrium with them.
         """
         pairs = self._tied()
         if not np.isin(pairs[:, 1], tied[:, 1]).all():
@@ -248,8 +259,10 @@ class Welding:
 
     def _equilibrium(self, shape: Pore, tied: np.ndarray,
                      placed: np.ndarray | None = None) -> Pore:
-        """The equilibrium with pairs (k, 2) that are tied, and others, ``placed``, half way between
-        their nodes."""
+        """The equilibrium with tied pairs (k, 2).
+
+        placed: (j, 2) pairs whose nodes are prescribed half way between them, None for no pairs.
+        """
         grown = self.grown
         mesh = grown.mesh
         union = Union.of(mesh, tied)
@@ -273,7 +286,7 @@ class Welding:
         return replace(shape.moved(points), pressure=pressure)
 
     def _solid(self, union: Union) -> WeldedSolid:
-        """The welded aggregates, each triangle in the reference of its own one."""
+        """The welded aggregates, with each triangle in the reference of its own aggregate."""
         mesh = self.grown.mesh
         reference = mesh.points.copy()
         in_triangles = []
@@ -287,8 +300,8 @@ class Welding:
                            in_triangles=mesh.by_triangle(in_triangles))
 
     def _prescribed(self, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
-        """(N, 2) True where a wall prescribes a coordinate of a node, and (N, 2) um, the places of
-        the nodes with these coordinates."""
+        """(N, 2) True where a coordinate of a node is prescribed, and (N, 2) um, positions of the
+        nodes with these coordinates."""
         mesh = self.grown.mesh
         prescribed = np.zeros((len(mesh.points), 2), bool)
         target = shape.mesh.points.copy()
@@ -309,7 +322,8 @@ class Welding:
         return supports
 
     def _closing(self, shape: Pore, number: int) -> np.ndarray:
-        """(M,) wall that each node of an aggregate must join next, or FREE; whole arcs join."""
+        """(M,) wall that each node of an aggregate must join next, or FREE; only entire arcs join.
+        """
         seen = shape.focused(number)
         outline = seen.boundary
         keys = self.mechanics.keys

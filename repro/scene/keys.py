@@ -386,7 +386,7 @@ class Growth:
     meeting: str = choice(
         "weld", "end", source="Section 5, without a model",
         about="Two aggregates that meet join and share their motion from then on, or end the run. "
-              "A weld needs two of them on opposite walls, curved elements, and neither erosion nor "
+              "A weld needs two of them on opposite walls and curved elements, without erosion and "
               "fluid forces; otherwise a meeting ends the run")
     until: str = choice(
         "end", "steady",

@@ -1,11 +1,11 @@
-"""The two schemes that solve a scene, to be compared side by side.
+"""The schemes that solve a scene.
 
-    paper     linear triangles, stabilised flow, updates of the shape, contact by nodes; and the
-              same as printed, which does not conserve mass
+    paper     linear triangles, stabilised flow, updates of the shape, contact by nodes; PRINTED
+              is the same scheme as printed, which does not conserve mass
     curved    curved quadratic triangles, Taylor-Hood flow, midpoint rule, contact lines
-    scheme    what a scheme chooses, and which choices go together
+    scheme    the choices of a scheme, and their valid combinations
 
-A preset of a scene is one of these schemes and a few numbers. Other combinations are for studies:
+A preset is one of these schemes plus a few numbers. Other combinations are for studies:
 ``repro.simulate(scene, scheme=replace(PAPER, carrier="u"))``.
 """
 

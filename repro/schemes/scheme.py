@@ -1,10 +1,10 @@
-"""What a scheme chooses, and which choices go together."""
+"""The choices of a scheme, and their valid combinations."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-#: The accepted words of each choice.
+#: {choice: accepted words}.
 WORDS: dict[str, tuple[str, ...]] = {
     "elements": ("linear", "quadratic"),
     "steps": ("updates", "midpoint"),
@@ -12,7 +12,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "inlet": ("local", "mean"),
     "transfer": ("projection", "interpolation", "shares"),
 }
-#: Transfers of biomass to a new mesh, by the elements.
+#: {elements: accepted transfers of biomass to a new mesh}.
 TRANSFERS = {"linear": ("projection", "interpolation"), "quadratic": ("shares",)}
 
 
@@ -20,16 +20,17 @@ TRANSFERS = {"linear": ("projection", "interpolation"), "quadratic": ("shares",)
 class Scheme:
     """How the equations of a scene are solved.
 
-    The modules of the solver ask the scheme; none of them knows a preset. ``replace`` of
-    ``dataclasses`` exchanges a choice.
+    The modules of the solver depend on the scheme and not on a preset. ``dataclasses.replace``
+    changes a choice.
 
     Parameters
     ----------
     elements : {"linear", "quadratic"}
-        Functions on straight triangles (3.2-3.4), or on curved ones. They determine the pair of
-        velocity and pressure (:mod:`repro.model.flow`), the integration of uptake and growth
-        (:mod:`repro.fem.space`), the stabilisation of growth (:mod:`repro.model.growth`) and the
-        closing of contact surfaces (:data:`repro.model.contact.CLOSINGS`).
+        Linear functions on straight triangles (3.2-3.4), or quadratic ones on curved triangles.
+        They determine the spaces of velocity and pressure (:mod:`repro.model.flow`), the
+        integration of uptake and growth (:mod:`repro.fem.space`), the stabilisation of growth
+        (:mod:`repro.model.growth`) and the rule by which films close
+        (:data:`repro.model.contact.CLOSINGS`).
     steps : {"updates", "midpoint"}
         Shape updates every ``growth.time_step`` (section 2), or the midpoint rule with error
         control (:mod:`repro.march`).
@@ -39,16 +40,16 @@ class Scheme:
     inlet : {"local", "mean"}
         u_x(y) in the inlet's condition (11), or u_ave as printed [E4].
     transfer : {"projection", "interpolation", "shares"}
-        Biomass on a new mesh (:mod:`repro.model.biomass`): on straight triangles Galerkin's
-        projection, which conserves it, or the paper's interpolation [E8]; on curved ones the shares
-        of X_I at the density X_m.
+        Transfer of biomass to a new mesh (:mod:`repro.model.biomass`). On straight triangles:
+        Galerkin's projection, which conserves biomass, or the paper's interpolation [E8]. On curved
+        triangles: the fraction of X_I is transferred, and the density becomes X_m.
     modified_newton : bool
-        Does Newton's method keep its derivative while the iterates converge fast?
+        Does Newton's method keep its derivative as long as it converges fast?
 
     Raises
     ------
     ValueError
-        If a word is not accepted, or if the elements have no such transfer.
+        If a word is not accepted, or if the transfer does not fit the elements.
 
     Examples
     --------
@@ -79,7 +80,8 @@ class Scheme:
 
     @property
     def follows_layers(self) -> bool:
-        """Are elements refined at boundary layers and fronts? Linear ones, the paper's, are not."""
+        """Are elements refined at boundary layers and fronts? The paper's linear elements are not.
+        """
         return self.order > 1
 
     @property
@@ -89,18 +91,18 @@ class Scheme:
 
     @property
     def conserves_substrates(self) -> bool:
-        """Do the balances of the substrates close to round-off?"""
+        """Are the balances of the substrates exact to round-off?"""
         printed_flux = self.carrier == "u" and self.order == 1
         return self.inlet == "local" and not printed_flux
 
     @property
     def conserves_biomass(self) -> bool:
-        """Does a new mesh have the biomass of the old one, to round-off?"""
+        """Does the transfer to a new mesh conserve the biomass, to round-off?"""
         return self.transfer != "interpolation"
 
 
 def _refuse_other(choice: str, word: object, words: tuple[str, ...]) -> None:
-    """Raise ValueError unless a word of a choice is accepted."""
+    """Raise ValueError if a word of a choice is not accepted."""
     if word not in words:
         accepted = " or ".join(f'"{each}"' for each in words)
         raise ValueError(f"scheme: {choice}: {accepted} is needed, not {word!r}")

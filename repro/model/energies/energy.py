@@ -1,4 +1,4 @@
-"""What growth asks of an elastic energy."""
+"""Interface of the elastic energies."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from repro.scene import Growth
 
 
 class Energy(ABC):
-    """Energy mu_L w(I) per volume at t = 0, of I = J^(-2/3) tr C, which does not depend on J.
+    """Energy mu_L w(I) per volume at t = 0, with the isochoric invariant I = J^(-2/3) tr C.
 
-    In plane strain tr C = F : F + 1. With a = 2 dw/dI and c = 4 d2w/dI2, the stress and the tangent
-    of :mod:`repro.model.growth` have A = a J^(-2/3), and the tangent has the further term
-    c (G : dF) G, where G = J^(-2/3) (F - tr C / 3 H). The shear modulus mu_L requires a = 1 at
-    I = 3.
+    In plane strain tr C = F : F + 1. Let a = 2 dw/dI and c = 4 d2w/dI2. The stress and the tangent
+    of :mod:`repro.model.growth` contain A = a J^(-2/3). The tangent also contains the term
+    c (G : dF) G with G = J^(-2/3) (F - tr C / 3 H). The shear modulus is mu_L if a = 1 at I = 3.
 
-    crease, biot: elastic stretches of a free surface at which it creases, and below which waves of
-    every length lower the energy. An energy without them has no derived limits, and no run with it
-    ends as a fold.
+    crease: elastic stretch at which a free surface creases; biot: elastic stretch below which waves
+    of every length lower the energy. Both are None if no limits are derived for the energy. A run
+    with this energy never ends as a fold.
     """
 
     crease: ClassVar[float | None] = None
@@ -28,7 +27,7 @@ class Energy(ABC):
 
     @property
     def invariant_limit(self) -> float:
-        """I is smaller than this."""
+        """Upper limit of I, which I does not reach."""
         return np.inf
 
     @staticmethod
@@ -45,6 +44,6 @@ class Energy(ABC):
         """(...) c = 4 d2w/dI2 at I (...); None if it is zero everywhere."""
 
     def growth_stiffness(self, theta: np.ndarray) -> np.ndarray | float:
-        """(...) a after growth by theta (...) without a change of shape. Small strains then have
-        the modulus a theta^(-2/3) mu_L."""
+        """(...) a after growth by theta (...) without a change of shape. The modulus for small
+        further strains is a theta^(-2/3) mu_L."""
         return self.stiffness(theta ** (-2 / 3) * (2 * theta + 1))

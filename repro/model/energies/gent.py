@@ -1,4 +1,4 @@
-"""Gent's energy: w = -(J_m / 2) ln(1 - (I - 3) / J_m), which stiffens towards a limit of I."""
+"""Gent's energy: w = -(J_m / 2) ln(1 - (I - 3) / J_m). It stiffens towards a limit of I."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from repro.scene import Growth
 class Gent(Energy):
     """A solid whose I stays below 3 + J_m (Gent, Rubber Chem. Technol. 69, 1996).
 
-    limit: J_m. Growth by theta alone has I = theta^(-2/3) (2 theta + 1), since F33 = 1: theta of
-    36 needs J_m above 3.7, theta of 1000 above 17.
+    limit: J_m. Growth by theta alone gives I = theta^(-2/3) (2 theta + 1), because F33 = 1. So
+    theta = 36 needs J_m above 3.7, and theta = 1000 needs J_m above 17.
     """
 
     limit: float
 
     @staticmethod
     def of(growth: Growth) -> Gent:
-        """The energy with the limit of a scene."""
+        """The energy with the limit J_m of a scene."""
         return Gent(growth.limiting_invariant)
 
     @property
     def invariant_limit(self) -> float:
-        """I is smaller than this."""
+        """Upper limit of I, which I does not reach."""
         return 3 + self.limit
 
     def stiffness(self, invariant: np.ndarray) -> np.ndarray:
@@ -40,10 +40,10 @@ class Gent(Energy):
         return 2 * self.limit / self._room(invariant) ** 2
 
     def _room(self, invariant: np.ndarray) -> np.ndarray:
-        """The distance of I from its limit."""
+        """(...) distance of I from its limit. Raises GrowthError if it is not positive."""
         room = self.invariant_limit - invariant
         if room.min() <= 0:
-            raise GrowthError(f"the strain reaches the limit of Gent's energy: I - 3 comes to "
-                              f"{np.max(invariant) - 3:.3g}, growth.limiting_invariant is "
+            raise GrowthError(f"the strain reaches the limit of Gent's energy: I - 3 is "
+                              f"{np.max(invariant) - 3:.3g}, and growth.limiting_invariant is "
                               f"{self.limit:g}")
         return room

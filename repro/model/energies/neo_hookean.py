@@ -10,7 +10,7 @@ import numpy as np
 from repro.model.energies.energy import Energy
 from repro.scene import Growth
 
-#: A crease lowers the energy of a surface that is compressed to this stretch, whatever its size.
+#: At this stretch of a free surface, a crease of any size lowers the energy.
 CREASE = 0.647
 #: Below this stretch, small waves of every length lower the energy.
 BIOT = 0.544
@@ -31,7 +31,7 @@ class NeoHookean(Energy):
 
     @staticmethod
     def of(growth: Growth) -> NeoHookean:
-        """The energy, which has no constant but mu_L."""
+        """The energy. Its only constant is mu_L."""
         return NEO_HOOKEAN
 
     def stiffness(self, invariant: np.ndarray) -> float:
