@@ -444,7 +444,7 @@ def test_contact_begins_on_both_sides_of_the_highest_point(plugged):
     lengths = {line.direction: contact_lines.to_length(replace(free, wall=wall), line) for line in upper}
     apart = free.nearest(upper_wall)[1] - free.points[corner, 0]
     assert sorted(lengths.values()) == pytest.approx(sorted([FILM - apart, FILM + apart]), abs=1e-9)
-    assert all(line.advance == line.least == line.short > 0 for line in upper)
+    assert all(line.advance == line.least == line.last_too_short > 0 for line in upper)
 
 
 def test_contact_begins_beside_a_line_that_lies_within_an_arc():

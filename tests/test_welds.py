@@ -105,7 +105,7 @@ def test_a_weld_does_not_advance_beyond_its_opposite_nodes():
     before = np.stack([np.column_stack([x, -0.5 * x]), np.column_stack([x, 0.5 * x])], axis=1)
     notch = welding.Notch(pairs, before, 2, 2.0, 0.3)
     notch.advance(before.reshape(-1, 2))
-    assert (notch.joined, notch.enough) == (0, 0)
+    assert (notch.joined, notch.first_enough) == (0, 0)
     closed = before * [1.0, 0.0]
     notch.advance(closed.reshape(-1, 2))
     assert notch.joined == 1

@@ -207,11 +207,11 @@ def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
 
 
 def _packed(points: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """(p, room, 2) points (p, k, 2) that ``mask`` (p, k) selects, padded with the first of them."""
+    """(p, width, 2) points (p, k, 2) selected by ``mask`` (p, k), padded with the first of them."""
     count = mask.sum(axis=1)[:, None]
-    room = max(3, int(count.max(initial=0)))
-    front = np.argsort(~mask, axis=1, kind="stable")[:, :room]
-    chosen = np.where(np.arange(room) < count, front, front[:, :1])
+    width = max(3, int(count.max(initial=0)))
+    front = np.argsort(~mask, axis=1, kind="stable")[:, :width]
+    chosen = np.where(np.arange(width) < count, front, front[:, :1])
     return np.take_along_axis(points, chosen[..., None], axis=1)
 
 

@@ -76,12 +76,12 @@ class Limits:
 
 
 def defect(supplied: float, out: float, consumed: float, stored: float = 0.0,
-           room: float = 0.0) -> float:
-    """(supplied - out - consumed - stored) / max(abs(supplied), consumed, room).
+           least_scale: float = 0.0) -> float:
+    """(supplied - out - consumed - stored) / max(abs(supplied), consumed, least_scale).
 
     Zero if the divisor is zero.
     """
-    scale = max(abs(supplied), consumed, room)
+    scale = max(abs(supplied), consumed, least_scale)
     return (supplied - out - consumed - stored) / scale if scale else 0.0
 
 
@@ -97,9 +97,10 @@ def floor(problem: Problem, k: int, supply: float) -> float:
     return float(np.finfo(float).eps / LARGEST * supply * terms.sum())
 
 
-def substrate(ledger: Ledger, k: int, room: float = 0.0) -> float:
+def substrate(ledger: Ledger, k: int, least_scale: float = 0.0) -> float:
     """Relative defect of the acceptor (k = 0) or the donor (1)."""
-    return defect(ledger.supplied[k], ledger.out[k], ledger.consumed[k], ledger.stored[k], room)
+    return defect(ledger.supplied[k], ledger.out[k], ledger.consumed[k], ledger.stored[k],
+                  least_scale)
 
 
 def biomass(ledger: Ledger) -> float:

@@ -212,11 +212,11 @@ class Line:
     wall: number of its wall; node: of the outline, at the previous position of the line; direction:
     1 or -1, along the outline from the line to the free surface; advance: arcs, of the present
     trial; accepted: is the present trial accurate enough?; reach: arcs beyond the line up to which
-    the surface is too near to the wall; least: smallest allowed advance; short: largest advance
-    known to be too short; far: smallest advance known to be far enough; stalls: has the last trial
-    halved neither the interval from short to far nor the clearance?; trials: the last two, as
-    (advance, clearance); floor: smallest advance that Newton's method allows, just beyond the last
-    corner at which the line rests or was too short.
+    the surface is too near to the wall; least: smallest allowed advance; last_too_short: largest
+    advance known to be too short; first_far_enough: smallest one known to be far enough; stalls:
+    has the last trial halved neither the interval between these two nor the clearance?; trials: the
+    last two, as (advance, clearance); newton_minimum: smallest advance that Newton's method allows,
+    just beyond the last corner at which the line rests or was too short.
     """
 
     wall: int
@@ -226,11 +226,16 @@ class Line:
     accepted: bool = False
     reach: float = 0.0
     least: float = 0.0
-    short: float = 0.0
-    far: float = np.inf
+    last_too_short: float = 0.0
+    first_far_enough: float = np.inf
     stalls: bool = False
     trials: list[tuple[float, float]] = field(default_factory=list)
-    floor: float = 0.0
+    newton_minimum: float = 0.0
+
+    @property
+    def interval(self) -> float:
+        """Length (arcs) of the interval that contains the line."""
+        return self.first_far_enough - self.last_too_short
 
     @property
     def key(self) -> tuple[int, int]:
@@ -250,45 +255,48 @@ class Line:
         else:
             self.trials[-1] = self.advance, clearance
         too_short = clearance < -CLOSE
-        before = self.far - self.short
+        before = self.interval
         worse = len(self.trials) == 2 and abs(clearance) > abs(self.trials[0][1]) / 2
         if too_short:
-            self.short = self.advance
+            self.last_too_short = self.advance
             # If another line has moved since, an advance that was far enough may be too short.
-            self.far = self.far if self.far > self.advance else np.inf
+            if self.first_far_enough <= self.advance:
+                self.first_far_enough = np.inf
         else:
-            self.far = self.advance
-            self.short = min(self.short, self.advance)
-        self.stalls = worse and self.far - self.short > before / 2
-        jumps = self.far <= max(self.short + SAME_PLACE, self.least + LEAST_PART)
+            self.first_far_enough = self.advance
+            self.last_too_short = min(self.last_too_short, self.advance)
+        self.stalls = worse and self.interval > before / 2
+        jumps = self.first_far_enough <= max(self.last_too_short + SAME_PLACE,
+                                             self.least + LEAST_PART)
         smallest = self.advance <= self.least
         self.accepted = not too_short and (smallest or clearance <= CLOSE or jumps)
 
     def start_from(self, advance: float) -> None:
         """Set the smallest allowed advance and the first trial to an advance (arcs)."""
         self.least = advance
-        self.short = advance
+        self.last_too_short = advance
         self.advance = advance
 
     def retreat(self) -> bool:
-        """Go half of the way back to ``short``. Returns whether the line has moved."""
-        distance = self.advance - self.short
+        """Go half of the way back to ``last_too_short``. Returns whether the line has moved."""
+        distance = self.advance - self.last_too_short
         if self.accepted or distance < LEAST_PART:
             return False
-        self.advance = self.short + distance / 2
+        self.advance = self.last_too_short + distance / 2
         return True
 
     def step(self) -> None:
         """Go to the next trial."""
-        if self.far == np.inf:
+        if self.first_far_enough == np.inf:
             most = self.advance + max(self.reach, LEAST_REACH)
             least = self.advance + LEAST_PART
             self.advance = min(max(self._secant(BEYOND), least), most)
         elif self.stalls:
-            self.advance = (self.short + self.far) / 2
+            self.advance = (self.last_too_short + self.first_far_enough) / 2
         else:
-            margin = INSIDE * (self.far - self.short)
-            self.advance = min(max(self._secant(1.0), self.short + margin), self.far - margin)
+            margin = INSIDE * self.interval
+            self.advance = min(max(self._secant(1.0), self.last_too_short + margin),
+                               self.first_far_enough - margin)
 
     def _secant(self, factor: float) -> float:
         """The advance (arcs) at the root of the secant through the last two trials.
@@ -302,9 +310,9 @@ class Line:
             rise = (clearance - clearance_before) / (advance - before)
             if rise > 0:
                 return advance - factor * clearance / rise
-        if self.far == np.inf:
+        if self.first_far_enough == np.inf:
             return advance + FIRST_TRIAL * self.reach
-        return self.far - FIRST_RETREAT * (self.far - self.short)
+        return self.first_far_enough - FIRST_RETREAT * self.interval
 
 
 def arc_ends(outline: Outline, line: Line) -> np.ndarray:

@@ -155,7 +155,7 @@ class Coupled:
         self.iterations = 0
         self._factors: Factored | None = None
         for line in lines:
-            line.floor = 0.0
+            line.newton_minimum = 0.0
 
     @failing_as(GrowthError)
     def solve(self, tolerance: float = growth.NEWTON) -> None:
@@ -229,7 +229,7 @@ class Coupled:
         for k in moving:
             line = self._lines[k]
             if near and clearances[k] < 0 and _before_corner(line.advance):
-                line.floor = round(line.advance) + BESIDE
+                line.newton_minimum = round(line.advance) + BESIDE
         if self.iterations == 0 or near:
             for k in set(moving) - set(within):
                 reach = FIRST_TRIAL * reaches[k] if self.iterations == 0 else DEPARTURE
@@ -260,7 +260,7 @@ class Coupled:
             steps[free] = np.linalg.solve(rises[np.ix_(free, free)], -rest[free])
             for line, step in zip(lines, steps):
                 if near and _beyond_corner(line.advance) and -2 * BESIDE < step < 0:
-                    line.floor = line.advance
+                    line.newton_minimum = line.advance
             ends = np.array([_place(line, line.advance, step, near) - line.advance
                              for line, step in zip(lines, steps)])
             stopped = free & (ends != steps)
@@ -281,7 +281,7 @@ def _fits(line: Line, clearance: float, close: float) -> bool:
 
     At the smallest allowed advance the clearance may be larger.
     """
-    smallest = line.advance <= max(line.least, line.floor)
+    smallest = line.advance <= max(line.least, line.newton_minimum)
     return clearance >= -close and (smallest or clearance <= close)
 
 
@@ -289,8 +289,8 @@ def _leave_corner(line: Line, clearance: float, reach: float) -> float:
     """The step (arcs) of a line away from a corner at which it is not at rest."""
     if clearance > 0:
         return max(-DEPARTURE, line.least - line.advance)
-    if line.floor:
-        return line.floor - line.advance
+    if line.newton_minimum:
+        return line.newton_minimum - line.advance
     return min(max(reach, DEPARTURE), LONGEST)
 
 
@@ -311,7 +311,7 @@ def _place(line: Line, start: float, step: float, near: bool = True) -> float:
     If it is there already, it goes to BESIDE before the corner. near: is the shape close to
     equilibrium? Otherwise a line beside a corner does not cross it.
     """
-    place = max(start + min(max(step, -LONGEST), LONGEST), line.least, line.floor)
+    place = max(start + min(max(step, -LONGEST), LONGEST), line.least, line.newton_minimum)
     corner = round(place)
     if abs(place - corner) >= LEAST_PART:
         return place

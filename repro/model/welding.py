@@ -75,9 +75,9 @@ class Notch:
     pairs: (k, 2) opposite nodes of the mesh, from the line on; before: (k, 2, 2) um, their
     positions in the old shape; size: number of nodes from corner to corner; film: least film (um);
     slope: tangent of the least angle; joined: number of pairs of corners beyond the old line that
-    have joined, in the present trial; few: largest number of pairs for which a film is too thin;
-    enough: smallest number for which no film is too thin; step: number of further pairs in the next
-    trial.
+    have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
+    thin; first_enough: smallest number for which no film is too thin; step: number of further pairs
+    in the next trial.
     """
 
     pairs: np.ndarray
@@ -86,11 +86,11 @@ class Notch:
     film: float
     slope: float
     joined: int = 0
-    enough: float = inf
+    first_enough: float = inf
     step: int = 1
 
     def __post_init__(self) -> None:
-        self.few = self.joined - 1
+        self.last_too_few = self.joined - 1
 
     @property
     def tied(self) -> np.ndarray:
@@ -104,18 +104,18 @@ class Notch:
         GrowthError if there are no further pairs.
         """
         if not self._too_thin(points):
-            self.enough = self.joined
+            self.first_enough = self.joined
         else:
-            self.few = self.joined
-            if self.enough <= self.joined:  # the other notch has moved since
-                self.enough, self.step = inf, 1
-        if self.enough < inf:
-            self.joined = int(self.few + self.enough + 1) // 2
+            self.last_too_few = self.joined
+            if self.first_enough <= self.joined:  # the other notch has moved since
+                self.first_enough, self.step = inf, 1
+        if self.first_enough < inf:
+            self.joined = int(self.last_too_few + self.first_enough + 1) // 2
             return
         last = (len(self.pairs) - 1) // self.size - 1
-        if self.few >= last:
+        if self.last_too_few >= last:
             raise GrowthError("the weld advances beyond the nodes that are opposite each other")
-        self.joined = min(self.few + self.step, last)
+        self.joined = min(self.last_too_few + self.step, last)
         self.step *= 2
 
     def _too_thin(self, points: np.ndarray) -> bool:
