@@ -1,5 +1,6 @@
 """Two aggregates that meet and weld: their outlines, one step against a plane of symmetry, masses, the strain of each
-side, resume and refusals. The case coupling-weld follows the mirror image until more of the pore is welded."""
+side, and refusals. The case coupling-weld follows the mirror image until more of the pore is welded, and
+`test_longer.py` resumes a run with a weld."""
 
 from dataclasses import replace
 from functools import cache
@@ -165,16 +166,6 @@ def test_the_order_and_the_names_of_welded_aggregates_do_not_matter():
     areas = [{body.name: outline.area for body, outline in zip(report.pore.bodies, report.pore.outlines)}
              for report in (one, other)]
     assert areas[1] == pytest.approx(areas[0], rel=1e-3)
-
-
-@pytest.mark.thorough
-def test_a_run_resumes_with_a_weld_to_the_last_bit(tmp_path):
-    longer = 'growth.end="0.4 h"'
-    repro.run("base", tmp_path / "run", [*SCENE, 'growth.end="0.3 h"'], unset=["flow.head"])
-    repro.resume(tmp_path / "run", [longer])
-    repro.run("base", tmp_path / "whole", [*SCENE, longer], unset=["flow.head"])
-    one, two = ((tmp_path / name / "timeseries.csv").read_text().splitlines()[-1] for name in ("run", "whole"))
-    assert one == two and float(one.split(",")[0]) == 0.4
 
 
 REFUSED = {
