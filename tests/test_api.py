@@ -199,11 +199,7 @@ def test_a_notebook_without_matplotlib_shows_key_figures_alone(solved, monkeypat
     assert "<img" not in html and "thickness of the aggregate 5 → 5.295 um" in html
 
 
-def test_help_begins_with_use_and_the_version_is_printed(capsys):
-    lines = repro.__doc__.splitlines()
-    assert "Ten lines of use" in lines[2] and sum("repro." in line for line in lines[4:14]) >= 6
-    code = "\n".join(line.strip() for line in lines[4:14])
-    assert set(re.findall(r"repro\.(\w+)\(", code)) <= {*repro.__all__}
+def test_the_version_is_printed(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["--version"])
     assert ended.value.code == 0 and capsys.readouterr().out == f"repro {repro.__version__}\n"
