@@ -109,9 +109,8 @@ def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
     assert original == NARROW and scene == load_scene(scene) and scene.name == "scene"
     file = tmp_path / "narrow.toml"
     file.write_text(str(scene))
-    from_file = solve(str(file))
-    for other in (solve(NARROW), solve(scene)):
-        assert all(np.array_equal(from_file[name], other[name]) for name in from_file)
+    from_file, *others = map(solve, (str(file), NARROW, scene))
+    assert all(same_arrays(from_file, other) for other in others)
     assert [load_scene(source, ["pore.width=40 um"]).pore.width for source in (scene, NARROW)] == [40, 40]
     extended = load_scene(scene, ["numerics.extent=full"], unset=["flow"])
     assert extended.flow is None and scene.flow is not None and original == NARROW
