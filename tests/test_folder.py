@@ -91,15 +91,6 @@ def test_links_are_refused(out, tmp_path, capsys, name):
     assert str(out / name) in message and "link" in message
 
 
-@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
-def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
-    """A pipe, a folder or a device does not hang the run."""
-    (out / NEWEST).unlink()
-    make(out / NEWEST)
-    assert f"{out / NEWEST}: it is not a regular file" in refusal(
-        out / "fields", capsys, "run", "--resume", out)
-
-
 def test_a_run_killed_at_its_very_end_is_tidied(tmp_path, capsys):
     """The status is written, the page is missing, and a checkpoint remains. A resume, the same command and --force
     each tidy the folder."""
