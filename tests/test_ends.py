@@ -235,8 +235,8 @@ def strength():
 
 
 @pytest.mark.parametrize("rising, scheme", [
-    (True, "updates"), (True, "midpoint"), (False, "midpoint"),
-    pytest.param(False, "updates", marks=pytest.mark.thorough)])
+    (True, "updates"), (False, "midpoint"),
+    *(pytest.param(*case, marks=pytest.mark.thorough) for case in ((True, "midpoint"), (False, "updates")))])
 def test_a_jump_is_judged_on_both_sides(rising, scheme):
     """Before a jump down the run ends within the step to the jump, where the traction reaches the strength under the
     strong flow. After a jump up it ends at the jump."""
