@@ -138,6 +138,16 @@ class Scene:
         return TimeCourse(self.section(section).get(key, TABLE_1[section].get(key)))
 
     @property
+    def width(self) -> float:
+        """Width of the pore, um."""
+        return self.number("pore", "width")
+
+    @property
+    def length(self) -> float:
+        """Length of the pore, um."""
+        return self.number("pore", "length")
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The substrates of the scene: both if it has the table of neither."""
         return tuple(name for name in NAMES if name in self.tables["substrates"]) or NAMES
@@ -438,7 +448,7 @@ def _unmatched(times, other_times) -> int:
 
 
 def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
-    width, length = scene.number("pore", "width"), scene.number("pore", "length")
+    width, length = scene.width, scene.length
     x, y = fields.points.T
     yield size("area of the mesh over meshed length times width, less one",
                fields.areas.sum() / (row["meshed_length_um"] * width) - 1, SUM, "triangles fill the meshed part")
@@ -452,7 +462,7 @@ def _geometry(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
 def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     if not scene.flows:
         return
-    width, length = scene.number("pore", "width"), scene.number("pore", "length")
+    width, length = scene.width, scene.length
     speed = row["mean_velocity_m_per_d"]
     drive = "head" if "head" in scene.section("flow") else "mean_velocity"
     column, unit = ("head_loss_cm", "cm") if drive == "head" else ("mean_velocity_m_per_d", "m/day")
@@ -536,7 +546,7 @@ def _uptake(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
                 for name in scene.names)
     if not scene.flows or scene.stores or steep:
         return
-    flow = row["mean_velocity_m_per_d"] * UNITS["m/day"] * scene.number("pore", "width")
+    flow = row["mean_velocity_m_per_d"] * UNITS["m/day"] * scene.width
     rates = dict(zip(NAMES, _rates(scene, fields)))
     for name in scene.names:
         rate = rates[name]
@@ -562,7 +572,7 @@ def _deformation(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
         body = np.unique(fields.cells[fields.body])
         bonded = body[(fields.points[body, 1] == 0) & (places[body, 1] == 0)]
         moved = fields.points[bonded, 0] - places[bonded, 0]
-        yield size("path of bonded nodes along the wall over the width", moved / scene.number("pore", "width"), SOLVED,
+        yield size("path of bonded nodes along the wall over the width", moved / scene.width, SOLVED,
                    "2.3.3: nodes on a bonded wall stay there; quadratic functions carry their positions exactly")
 
 
@@ -590,7 +600,7 @@ def _steps(run: Run) -> Iterator[Finding]:
 def _substrates(run: Run) -> Iterator[Finding]:
     """Check that each substrate's supply equals the amounts that leave, are consumed and are stored."""
     scene = run.scene
-    width, length = scene.number("pore", "width"), scene.number("pore", "length")
+    width, length = scene.width, scene.length
     for name in scene.names:
         supplied, out, consumed, stored = (run.ledger[f"{name}_{part}_pg_per_m"]
                                            for part in ("supplied", "out", "consumed", "stored"))

@@ -32,6 +32,8 @@ lengths = st.floats(300.0, 1000.0)
 refinements = st.floats(0.4, 2.0)
 #: Orders of velocity and concentrations, and their names in scenes.
 ORDERS = {1: "linear", 2: "quadratic"}
+#: Presets with elements of these orders.
+PRESET_OF = {1: "paper", 2: "fast"}
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
@@ -119,6 +121,11 @@ def rate_constants(scene):
     return {"half_a": s.acceptor.half_saturation, "half_d": s.donor.half_saturation, "k": k.maximum_utilization_rate,
             "Y": k.yield_coefficient, "b": k.decay_coefficient, "f_d": k.degradable_fraction,
             "d_c": k.decay_oxygen_demand, "F": k.acceptor_to_donor_ratio}
+
+
+def in_um(points):
+    """The points of an outline (um), as a scene has them."""
+    return [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in points]
 
 
 def number(text):

@@ -80,7 +80,8 @@ FOLLOWED = {
         '"stress_free" avoids this': STRESS_FREE},
     "runs/execution.py": {
         "--resume makes a run longer": LONGER, "give a later one": LONGER, "run another scene": FOLDERS,
-        "give a new folder": FOLDERS, "with --force": "tests/test_resume.py::test_only_force_repeats_a_damaged_run",
+        "give a new folder": FOLDERS,
+        "with --force": "tests/test_resume.py::test_every_bit_of_a_finished_run_is_checked",
         "try a smaller numerics.refinement": MEMORY},
     "runs/folder.py": {
         "move the folder away": FOLDERS, "give a new folder": FOLDERS, "move the files": FOLDERS,

@@ -109,9 +109,8 @@ def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
     assert original == NARROW and scene == load_scene(scene) and scene.name == "scene"
     file = tmp_path / "narrow.toml"
     file.write_text(str(scene))
-    from_file = solve(str(file))
-    for other in (solve(NARROW), solve(scene)):
-        assert all(np.array_equal(from_file[name], other[name]) for name in from_file)
+    from_file, *others = map(solve, (str(file), NARROW, scene))
+    assert all(same_arrays(from_file, other) for other in others)
     assert [load_scene(source, ["pore.width=40 um"]).pore.width for source in (scene, NARROW)] == [40, 40]
     extended = load_scene(scene, ["numerics.extent=full"], unset=["flow"])
     assert extended.flow is None and scene.flow is not None and original == NARROW
@@ -199,11 +198,7 @@ def test_a_notebook_without_matplotlib_shows_key_figures_alone(solved, monkeypat
     assert "<img" not in html and "thickness of the aggregate 5 → 5.295 um" in html
 
 
-def test_help_begins_with_use_and_the_version_is_printed(capsys):
-    lines = repro.__doc__.splitlines()
-    assert "Ten lines of use" in lines[2] and sum("repro." in line for line in lines[4:14]) >= 6
-    code = "\n".join(line.strip() for line in lines[4:14])
-    assert set(re.findall(r"repro\.(\w+)\(", code)) <= {*repro.__all__}
+def test_the_version_is_printed(capsys):
     with pytest.raises(SystemExit) as ended:
         main(["--version"])
     assert ended.value.code == 0 and capsys.readouterr().out == f"repro {repro.__version__}\n"

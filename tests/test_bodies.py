@@ -21,16 +21,14 @@ from repro.model.mechanics import Mechanics
 from repro.model.meshing import Seeding, seeded
 from repro.model.solving import Solver
 from repro.scene import load_scene
-
-EVERY = pytest.mark.parametrize("order", [1, 2])
+from tests.strategies import EVERY_ORDER, PRESET_OF
 
 
 def pair(order, width=40, second=12):
     """A scene with an aggregate of 17.8 um and a second one, and its pore at t = 0."""
-    preset = {1: "paper", 2: "fast"}[order]
     aggregates = f'aggregate=[{{radius="17.8 um", position="-30 um"}}, {{radius="{second} um", position="30 um"}}]'
-    scene = load_scene("base", [f"numerics.preset={preset}", "numerics.refinement=0.3", f"pore.width={width} um",
-                                aggregates])
+    scene = load_scene("base", [f"numerics.preset={PRESET_OF[order]}", "numerics.refinement=0.3",
+                                f"pore.width={width} um", aggregates])
     return scene, seeded(scene)
 
 
@@ -43,7 +41,7 @@ def grown(scene, pore, factor):
     return after, growing.compute_theta(pore, after, density)
 
 
-@EVERY
+@EVERY_ORDER
 def test_each_of_two_equal_aggregates_comes_into_contact(order):
     """Films of 2.2 um to the upper wall close, and both shapes are alike up to their meshes."""
     scene, both = pair(order, 20, 17.8)
@@ -58,7 +56,7 @@ def test_each_of_two_equal_aggregates_comes_into_contact(order):
     assert lengths[1] == pytest.approx(lengths[0], rel=0.02)  # the meshes differ; 0.4 % is measured
 
 
-@EVERY
+@EVERY_ORDER
 def test_a_transfer_keeps_the_masses_of_each_aggregate(order):
     """A transfer between the same meshes; the second aggregate has half of the density of inert biomass."""
     scene, both = pair(order)
@@ -93,10 +91,10 @@ def started(scene, *places):
     return loop.steps(scene, stepping, RestartState(contiguous(replace(pore, bodies=bodies)), first))
 
 
-@EVERY
+@EVERY_ORDER
 def test_a_film_between_two_aggregates_has_elements_as_small_as_one_at_a_wall(order):
     """Between two half-discs that face each other lie ten elements per refinement, and none without the second."""
-    scene = load_scene("base", [f"numerics.preset={dict(enumerate(('paper', 'fast'), 1))[order]}", "pore.width=50 um",
+    scene = load_scene("base", [f"numerics.preset={PRESET_OF[order]}", "pore.width=50 um",
                                 "numerics.refinement=0.5"])
     facing = seeds_at(scene, (20.0, 0.0, BOTTOM), (20.0, 0.0, TOP))
     (_, beside), _ = sizing.each_beside(facing, meshing.sized(scene))
@@ -118,11 +116,10 @@ def test_each_aggregate_gets_the_growth_that_was_computed_for_it():
         assert (new.inert - old.inert).sum() == pytest.approx(inert, rel=1e-9)
 
 
-@EVERY
+@EVERY_ORDER
 def test_two_aggregates_that_meet_on_one_wall_end_the_run_there(order):
     """Where the film is as thin as the least one. The case coupling-meeting has opposite walls."""
-    preset = {1: "paper", 2: "fast"}[order]
-    scene = load_scene("base", [f"numerics.preset={preset}", "numerics.refinement=0.4", "pore.width=40 um",
+    scene = load_scene("base", [f"numerics.preset={PRESET_OF[order]}", "numerics.refinement=0.4", "pore.width=40 um",
                                 'growth.end="40 h"', 'growth.minimum_film="4 um"', 'growth.time_step="0.5 h"'])
     seeds = (12.0, -15.0, BOTTOM), (10.0, 15.0, BOTTOM)
     reports = []

@@ -366,8 +366,12 @@ def test_check_describes_values_over_time():
     ("pore.length", "flow_only", ["aggregate.radius=40 um", "pore.length=200 um"], "from the start (reach 40 of 100"),
     ("numerics.refinement", "base", FEW[1:], "= 0.76 um, thinner than"),
     ("growth.time_step", "base", ["growth.time_step=0.6 h"], "grows by 11 % in a shape update, above 10 %"),
+    *(("numerics.refinement", "wide", [f"substrates.donor.half_saturation={half} mg/L", "numerics.refinement=0.1",
+                                       "kinetics.maximum_density=3e6 mg/L"], f"donor is used up in a {layer} ")
+      for half, layer in ((0.02, "zero-order front"), (20, "layer of first-order uptake"))),
     ("substrates.donor.diffusivity_in_aggregate", "base", ["substrates.donor.diffusivity=2 cm^2/day"], "40.5 % of")])
 def test_a_warning_states_its_numbers(key, name, changes, excerpt):
+    """A thin layer is of zero order if the supply exceeds the half saturation."""
     warnings = warned(load_scene(name, changes), 160.0)
     assert [warning.key for warning in warnings if excerpt in warning.text] == [key]
 
@@ -422,15 +426,6 @@ def test_requested_rows_are_counted_with_that_at_zero(times):
     description = dict(modelled.describe_model(scene))
     assert "rows and fields at 3 times" in description["output"]
     assert "an aggregate with a permeability of 2.5e-15 m2" in description["flow"]
-
-
-@pytest.mark.parametrize("half, kind", [("0.02 mg/L", "zero-order front"), ("20 mg/L", "layer of first-order uptake")])
-def test_the_warning_of_a_thin_layer_names_its_kind(half, kind):
-    """The layer is of zero order if the supply exceeds the half saturation."""
-    scene = load_scene("wide", [f'substrates.donor.half_saturation="{half}"', 'kinetics.maximum_density="3000000 mg/L"',
-                                "numerics.refinement=0.1"])
-    texts = [warning.text for warning in warned(scene) if "donor is used up" in warning.text]
-    assert len(texts) == 1 and f"in a {kind} " in texts[0]
 
 
 BASE = load_scene("base", ["numerics.preset=fast"])

@@ -18,7 +18,6 @@ from repro.runs.checkpoint import NEWEST, PREVIOUS, decode
 from repro.runs.execution import Watch, run
 from repro.runs.recorder import Recorder
 from repro.scene import load_scene
-from tests.faults import limit_memory
 from tests.test_state import alike
 
 TIMES = ('growth.end="0.6 h"', 'output.times=["0.2 h", "0.6 h"]')
@@ -91,14 +90,6 @@ def test_nothing_in_a_forged_checkpoint_is_executed(tmp_path):
     with pytest.raises(ValueError, match="allow_pickle=False"):
         decode(signed(file.getvalue()))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_that_is_too_long_is_not_read(saved, tmp_path):
-    """test_folder.py tests files that are not regular."""
-    with (tmp_path / "x").open("wb") as file:
-        file.truncate(2**31)
-    with limit_memory(2**20), pytest.raises(CheckpointError, match="longer than"):
-        Recorder(*saved[:2]).restore(tmp_path / "x")
 
 
 @example(b"")

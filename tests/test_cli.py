@@ -66,18 +66,12 @@ def write_to(out, *arguments):
     return process.returncode, stderr
 
 
-# All commands print with one function.
-@pytest.mark.parametrize("arguments", [
-    ["scene", "base"],
-    pytest.param(["sweep", "initial_mesh", "--vary", "pore.width=40 um, 50 um"], marks=pytest.mark.thorough)])
-def test_a_closed_output_is_no_failure(tmp_path, arguments):
-    """The output is closed as by `| head -0`. A sweep continues to its end."""
+def test_a_closed_output_is_no_failure():
+    """The output is closed as by `| head -0`. All commands print with one function; `test_progress.py` has runs."""
     end, pipe = os.pipe()
     os.close(end)
-    status, stderr = write_to(pipe, *arguments, *(["--out", tmp_path] if "sweep" in arguments else []))
+    assert write_to(pipe, "scene", "base") == (0, "")
     os.close(pipe)
-    assert status == 0 and re.sub(".*completed.*\n", "", stderr) == ""
-    assert "sweep" not in arguments or (tmp_path / "summary.html").exists()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that takes nothing is needed")

@@ -372,19 +372,6 @@ def rows_at(scene, times):
     return [*simulate(load_scene(scene, [f"output.times={[f'{time!r} h' for time in times]}"]))][1:]
 
 
-@pytest.mark.parametrize("width, end, count", [
-    (25, 17.0, 6), *(pytest.param(*pore, 50, marks=pytest.mark.thorough)
-                     for pore in ((100, 45.0), (25, 18.0), (40, 24.0), (60, 32.0)))])
-def test_rows_through_contact_decide_nothing(width, end, count):
-    """A run reaches its end, in the same state to the last bit, for any requested rows."""
-    scene = load_scene("wide", ["numerics.preset=fast", f'pore.width="{width} um"', f'growth.end="{end} h"'])
-    drawn = np.random.default_rng(width).uniform(0.8 * end, end, count)
-    last, = rows_at(scene, [end])
-    *_, same = rows_at(scene, [*sorted(map(float, drawn)), end])
-    assert last.pore.contact and np.array_equal(same.pore.mesh.points, last.pore.mesh.points)
-    assert np.array_equal(same.pore.active, last.pore.active)
-
-
 @pytest.mark.thorough
 def test_a_row_that_cannot_be_interpolated_is_reached_by_steps_of_its_own(plugged, monkeypatch):
     scene = plugged[0]

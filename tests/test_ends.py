@@ -98,16 +98,6 @@ def test_every_end_is_located_within_its_step(name, scheme):
     assert ledgers[-1].end == pytest.approx(time, abs=1e-9)
 
 
-@pytest.mark.parametrize("side, position", [("upstream", "-91.3 um"), ("downstream", "91.3 um")])
-@pytest.mark.parametrize("order", [1, -1])
-def test_the_pores_end_names_the_aggregate(side, position, order):
-    """One of two aggregates, whatever its place in the list, reaches the pore's end; its status is that of an end."""
-    seeds = [f'{{radius="5 um", position="{position}", name="far"}}', '{radius="5 um", wall="upper"}'][::order]
-    changes = (*COARSE, "pore.length=200 um", f"aggregate=[{', '.join(seeds)}]")
-    *_, status = rows_of(load_scene("base", changes))
-    assert status.startswith(f"aggregate far reaches the pore's {side} end at t = ") and is_over(status)
-
-
 @pytest.mark.parametrize("number, name", [(0, "one"), (1, "two")])
 def test_a_fold_names_the_aggregate(number, name):
     """The material of one of two seeds was twice as long: its surface is compressed. The fold's status is that of an
@@ -245,8 +235,8 @@ def strength():
 
 
 @pytest.mark.parametrize("rising, scheme", [
-    (True, "updates"), (True, "midpoint"), (False, "midpoint"),
-    pytest.param(False, "updates", marks=pytest.mark.thorough)])
+    (True, "updates"), (False, "midpoint"),
+    *(pytest.param(*case, marks=pytest.mark.thorough) for case in ((True, "midpoint"), (False, "updates")))])
 def test_a_jump_is_judged_on_both_sides(rising, scheme):
     """Before a jump down the run ends within the step to the jump, where the traction reaches the strength under the
     strong flow. After a jump up it ends at the jump."""

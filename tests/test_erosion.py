@@ -196,15 +196,10 @@ def test_a_step_that_erodes_a_contact_surface_ends_the_run():
     (("growth.new_biomass=stressed",), "growth.new_biomass = 'stressed'|\"stress_free\" is needed"),
     (('growth.erosion.speed="1 um/h"', "growth.erosion.law=shear"), "growth.erosion"),
     (('growth.erosion.critical_shear="1 Pa"',), "\"shear\" is needed|growth.erosion.law = \"shear\" is needed"),
-    (('growth.erosion.thickness_coefficient="1 1/um/h"',), "is needed")])
+    (('growth.erosion.thickness_coefficient="1 1/um/h"',), "is needed"),
+    *((("growth.erosion={}", f'growth.erosion.law="{law}"'), "is missing|needed with")
+      for law in ("constant", "thickness squared", "shear"))])
 def test_scenes_without_a_model_of_erosion_are_refused(changes, message):
     with pytest.raises(SceneError, match=message):
         load_scene("base", ["numerics.preset=fast", "growth.new_biomass=stress_free", erosion("constant", 0.1),
                             *changes])
-
-
-@pytest.mark.parametrize("law", ["constant", "thickness squared", "shear"])
-def test_each_law_needs_its_key(law):
-    with pytest.raises(SceneError, match="is missing|needed with"):
-        load_scene("base", ["numerics.preset=fast", "growth.new_biomass=stress_free",
-                            f'growth.erosion={{law="{law}"}}'])

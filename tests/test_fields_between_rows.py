@@ -10,6 +10,7 @@ import repro
 from repro.results import COLUMNS, tables
 from repro.results.files import sha256_of
 from repro.runs import scripts
+from tests.strategies import same_arrays
 
 FEW = {"numerics.preset": "fast", "growth.end": "0.6 h", "output.times": ["0 h", "0.3 h", "0.6 h"]}
 MORE = {**FEW, "output.times": ["0 h", "0.1 h", "0.3 h", "0.35 h", "0.55 h", "0.6 h"]}
@@ -21,15 +22,10 @@ def solved(preset, more=False):
     return repro.solve("base", {**(MORE if more else FEW), "numerics.preset": preset})
 
 
-def same(one, other):
-    """Do two states have the same arrays, to the last bit?"""
-    return one.keys() == other.keys() and all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)
-
-
 @pytest.mark.parametrize("preset", ["fast", "paper"])
 @pytest.mark.parametrize("time", TIMES)
 def test_fields_between_rows_are_those_of_a_row_there(preset, time):
-    assert same(solved(preset).fields(time), solved(preset, more=True).fields(time))
+    assert same_arrays(solved(preset).fields(time), solved(preset, more=True).fields(time))
 
 
 @pytest.mark.parametrize("preset", ["fast", pytest.param("paper", marks=pytest.mark.thorough)])
@@ -39,7 +35,7 @@ def test_a_run_in_a_folder_has_them_too_and_stays_as_it_is(tmp_path, preset):
     sums = {path: sha256_of(path) for path in (tmp_path / "run").rglob("*") if path.is_file()}
     with warnings.catch_warnings(action="error"):
         for time in TIMES:
-            assert same(results.fields(time), solved(preset, more=True).fields(time))
+            assert same_arrays(results.fields(time), solved(preset, more=True).fields(time))
     assert {path: sha256_of(path) for path in (tmp_path / "run").rglob("*") if path.is_file()} == sums
     assert results.fields(0.1) is results.fields("6 min") and results.outline(0.1).time == 0.1
 
@@ -72,7 +68,7 @@ def test_a_run_reaches_beyond_its_rows():
     """To the end of its scene, and back to t = 0."""
     inner = repro.solve("base", {**FEW, "output.times": ["0.3 h"]})
     for time in (0, 0.1, 0.55, 0.6):
-        assert same(inner.fields(time), solved("fast", more=True).fields(time))
+        assert same_arrays(inner.fields(time), solved("fast", more=True).fields(time))
 
 
 def test_a_profile_is_the_field_along_a_line():

@@ -16,6 +16,7 @@ from repro.model.interface import interface_of
 from repro.model.meshing import seeded
 from repro.model.resistance import Viscous
 from repro.scene import load_scene
+from tests.strategies import in_um
 
 
 def in_a_permeable_body(permeability, refinement):
@@ -58,8 +59,7 @@ PROMISED = {"fast": 0.02, "accurate": 0.005}
 
 
 def drawn_body(body, preset, interface):
-    outline = [[f"{x} um", f"{y} um"] for x, y in BODIES[body]]
-    return load_scene({"pore": {"width": "50 um"}, "aggregate": {"outline": outline},
+    return load_scene({"pore": {"width": "50 um"}, "aggregate": {"outline": in_um(BODIES[body])},
                        "flow": {"mean_velocity": "1 m/day"}, "numerics": {"preset": preset, "interface": interface}})
 
 

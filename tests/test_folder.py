@@ -18,7 +18,7 @@ from repro.runs.checkpoint import NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
 from repro.runs.folder import LOCK
 from repro.runs.scripts import load_run
-from repro.scene import load_scene, parse_scene, scene_tables
+from repro.scene import load_scene
 from tests.pages import cached_run
 from tests.shell import (
     files,
@@ -89,15 +89,6 @@ def test_links_are_refused(out, tmp_path, capsys, name):
     (out / name).symlink_to(tmp_path / "elsewhere")
     message = refusal(tmp_path, capsys, "run", "--resume", out)
     assert str(out / name) in message and "link" in message
-
-
-@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
-def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
-    """A pipe, a folder or a device does not hang the run."""
-    (out / NEWEST).unlink()
-    make(out / NEWEST)
-    assert f"{out / NEWEST}: it is not a regular file" in refusal(
-        out / "fields", capsys, "run", "--resume", out)
 
 
 def test_a_run_killed_at_its_very_end_is_tidied(tmp_path, capsys):
@@ -182,16 +173,3 @@ def test_no_record_counts_rows_that_the_table_lacks(short, tmp_path, monkeypatch
     run(short, out, watch=Watch(interval=0.0))
     assert len(counts) > 4 and [written for _, written in counts] == [*range(1, len(counts) + 1)]
     assert all(recorded <= written for recorded, written in counts)
-
-
-@pytest.mark.parametrize("name", ["../../outside", "/etc/cron.d/x", "a\nb", "\x1b[2J\x1b]0;owned\x07", "..", "x" * 300])
-def test_the_name_of_a_scene_is_no_path(tmp_path, capsys, monkeypatch, name):
-    """A run of any scene name writes into its folder and prints one line."""
-    monkeypatch.chdir(tmp_path)
-    scene = parse_scene(scene_tables(load_scene("flow_only")), name, "scene.toml")
-    monkeypatch.setattr("repro.cli.run.load_scene", lambda *_, **__: scene)
-    assert main(["run", "x", "--out", "run"]) == 0
-    line = capsys.readouterr().out
-    assert line.count("\n") == 1 and line.strip("\n").isprintable() and read_record(tmp_path / "run")["scene"] == name
-    assert sorted(str(path.relative_to(tmp_path / "run")) for path in tmp_path.rglob("*") if path.is_file()) == sorted(
-        read_record(tmp_path / "run")["files"])

@@ -1,10 +1,7 @@
 """A scene loads the modules of its sections alone: "the sections present are the physics that runs"."""
-import subprocess
-import sys
-
 import pytest
 
-from tests.blocks import ROOT
+from tests.shell import run_python
 
 #: Modules by the part of a scene that switches them on.
 PARTS = {
@@ -29,9 +26,7 @@ AT_REST = "unset=['growth'], overrides=['numerics.preset=paper'"
 
 def loaded(code):
     """Return the modules that a new process has loaded after some code."""
-    code = f"import sys, repro\n{code}\nprint(*sys.modules)"
-    command = [sys.executable, "-W", "ignore", "-c", code]
-    return {*subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout.split()}
+    return {*run_python(f"import sys, repro\n{code}\nprint(*sys.modules)").stdout.split()}
 
 
 def modules_of(names):

@@ -19,7 +19,7 @@ from repro.model import contact
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
 from repro.preflight import simplifications
-from tests.strategies import MIRRORS, outlines
+from tests.strategies import MIRRORS, in_um, outlines
 from tests.test_derived import SHAPE, SPANNING, drawn
 from verification import claims, sensitivity
 from verification.network import law
@@ -76,18 +76,13 @@ def test_contact_advances_alike_in_a_pore_and_its_mirror_image(order, spans, ima
     assert (np.abs(after - before) > 0.1).all(), "each line has moved"
 
 
-def scene_with_outline(name, points, *changes):
-    """A scene with an outline."""
-    text = ", ".join(f'["{x!r} um", "{y!r} um"]' for x, y in points.tolist())
-    return load_scene(name, [f"aggregate.outline=[{text}]", *changes], unset=["aggregate.radius"])
-
-
 @SIDES
 def test_the_reach_of_an_outline_is_reported_on_either_side(sign, side):
     """The farther end counts: 100 um of 130 um."""
     points = np.array([[-20.0, 0.0], [-10.0, 12.0], [60.0, 20.0], [100.0, 0.0]])
     points = points if sign > 0 else points[::-1] * [-1, 1]
-    scene = scene_with_outline("base", points, "pore.length=260 um", "growth.end=0 h")
+    scene = load_scene("base", [f"aggregate.outline={in_um(points)}", "pore.length=260 um", "growth.end=0 h"],
+                       unset=["aggregate.radius"])
     warnings = {warning.key: warning.text for warning in simplifications.find_warnings(scene, 1e5)}
     assert "(reach 100 of 130 um)" in warnings.get("pore.length", "")
 

@@ -2,7 +2,6 @@
 
 The case hard-family has thin films and seeds beside the pore's ends.
 """
-import json
 import math
 import random
 from dataclasses import replace
@@ -19,6 +18,7 @@ from repro.preflight import memory
 from repro.preflight.checked import check
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
 from tests.shell import refusal
+from tests.strategies import in_um
 
 #: The most nodes that any outline of at most 1000 points may need in the preset fast.
 MOST_NODES = 30_000
@@ -73,9 +73,9 @@ FAMILIES = [sliver, wedge, needle, overhang, fold, many_points, tiny_and_huge_ed
 
 
 def scene(points, preset="fast"):
-    outline = [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in points]
     return parse_scene({
-        "pore": {"width": f"{WIDTH} um"}, "aggregate": {"outline": outline}, "flow": {"mean_velocity": "2.9 m/day"},
+        "pore": {"width": f"{WIDTH} um"}, "aggregate": {"outline": in_um(points)},
+        "flow": {"mean_velocity": "2.9 m/day"},
         "substrates": {"acceptor": {"supply": "10 mg/L"}, "donor": {"supply": "10 mg/L"}}, "kinetics": {},
         "growth": {"end": "0.2 h"}, "numerics": {"preset": preset}}, "odd", "odd.toml")
 
@@ -153,8 +153,7 @@ def test_gaps_that_no_mesh_resolves_are_refused(points, needed):
 ])
 def test_a_spline_that_is_no_outline_is_refused_before_anything_is_written(tmp_path, capsys, command, points, needed):
     path = tmp_path / "odd.toml"
-    outline = [[f"{x} um", f"{y} um"] for x, y in points]
-    path.write_text(f'[pore]\nwidth = "100 um"\n[aggregate]\nsmooth = true\noutline = {json.dumps(outline)}\n')
+    path.write_text(f'[pore]\nwidth = "100 um"\n[aggregate]\nsmooth = true\noutline = {in_um(points)}\n')
     out = ["--out", tmp_path / "run"] if command == "run" else []
     message = refusal(tmp_path, capsys, command, path, *out)
     assert needed in message and "try smooth = false" in message

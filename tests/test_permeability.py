@@ -10,6 +10,7 @@ from repro.results.permeability import LAWS, fitted, of_runs
 from repro.scene import load_scene, scene_tables
 from repro.sweeps import driver
 from tests.shell import rows
+from tests.strategies import in_um
 from tests.test_loaded_modules import loaded
 from tests.test_sweep import in_this_process
 
@@ -80,8 +81,7 @@ def test_a_layer_of_the_solver_has_its_closed_form():
     bound is a percent, the accuracy of `fast`."""
     losses = []
     for half in (100, 150):
-        points = ((-half - 20, 0), (-half, 20), (half, 20), (half + 20, 0))
-        outline = [[f"{x} um", f"{y} um"] for x, y in points]
+        outline = in_um([(-half - 20, 0), (-half, 20), (half, 20), (half + 20, 0)])
         scene = {"pore": {"width": "50 um"}, "aggregate": {"outline": outline}, "flow": {"mean_velocity": "1 m/day"}}
         run = repro.solve(scene, {"numerics.preset": "fast"})
         rows_ = of_runs([run, results([0, 0.1, 0.2], [1, 0.7, 0.4])]).columns

@@ -130,10 +130,7 @@ def test_errors_name_arguments_in_python_and_options_on_the_command_line(tmp_pat
 
 @pytest.mark.exact_lengths
 @pytest.mark.parametrize("call, reached", [
-    pytest.param(lambda folder, **keywords: repro.run("base", folder / "run", SHORT, **keywords), "0.2 of 0.2 h",
-                 marks=pytest.mark.thorough),
-    pytest.param(lambda folder, **keywords: repro.solve("base", SHORT, **keywords), "0.2 of 0.2 h",
-                 marks=pytest.mark.thorough),
+    (lambda folder, **keywords: repro.run("base", folder / "run", SHORT, **keywords), "0.2 of 0.2 h"),
     (lambda folder, **keywords: repro.solve("flow_only", **keywords), "100%"),
     (lambda folder, **keywords: repro.sweep("flow_only", ["pore.width=40 um, 50 um"], folder / "sweep", workers=1,
                                             **keywords), "2 of 2 runs")])

@@ -16,6 +16,7 @@ from repro.model.meshing import seeded
 from repro.preflight import resolved
 from repro.preflight.resolved import find_unresolved_flow
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
+from tests.strategies import in_um
 
 #: Largest relative difference between fast and accurate without a warning.
 FAST = 0.015
@@ -24,9 +25,8 @@ SPIKES = [(-14.6091, 0), (-6.88447, 11.647), (-4.89941, 26.2897), (-0.60518, 22.
 
 
 def scene(width, points, preset="fast", refinement=None):
-    outline = [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in points]
     numerics = {"preset": preset} if refinement is None else {"preset": preset, "refinement": refinement}
-    return parse_scene({"pore": {"width": f"{width!r} um", "length": "600 um"}, "aggregate": {"outline": outline},
+    return parse_scene({"pore": {"width": f"{width!r} um", "length": "600 um"}, "aggregate": {"outline": in_um(points)},
                         "flow": {"mean_velocity": "0.3032 m/day"}, "numerics": numerics}, "ragged", "ragged.toml")
 
 

@@ -14,6 +14,7 @@ from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
 from repro.scene import load_scene
+from tests.strategies import PRESET_OF
 
 #: Seeds: one, one on the upper wall, and two on opposite walls.
 SEEDS = {"one": [{}], "upper": [{"wall": "upper"}],
@@ -25,8 +26,7 @@ def grown_pore(order, seeds):
     """A scene and its pore after growth that differs from place to place; each aggregate sits off the middle."""
     tables = ", ".join("{" + ", ".join(f'{key}="{value}"' for key, value in {"radius": "8 um", **seed}.items()) + "}"
                        for seed in SEEDS[seeds])
-    preset = {1: "paper", 2: "fast"}[order]
-    scene = load_scene("base", [f"numerics.preset={preset}", "growth.wall=bonded", f"aggregate=[{tables}]"])
+    scene = load_scene("base", [f"numerics.preset={PRESET_OF[order]}", "growth.wall=bonded", f"aggregate=[{tables}]"])
     seed = seeded(scene)
     thetas = [body.theta * (1.1 + 0.003 * np.arange(len(body.theta))[:, None] / len(body.theta))
               for body in seed.bodies]

@@ -362,51 +362,23 @@ def test_names_of_columns_of_bodies_tell_quantity_unit_and_body():
     assert names.known("aggregate__area_um2") is None and names.known("aggregate_area_um2").name in known
 
 
-@pytest.mark.thorough
-def test_columns_of_a_body_that_has_left_are_empty(tmp_path):
-    """The first body leaves, then the second one. Sums, balances, fields and files go on without them."""
-    growth = {"end": "1 h", "wall": "bonded", "fluid_forces": "included", "bonding_strength": "500 Pa",
-              "after_detachment": "continue"}
-    scene = scene_of(growth=growth, output={}, flow={"mean_velocity": "20 m/day"}, numerics={"preset": "fast"})
-    repro.run(scene, tmp_path / "run")
-    run = repro.load_run(tmp_path / "run")
-    left, other, area = (run[f"aggregate{name}_area_um2"] for name in ("_left", "_2", ""))
-    alone = np.isnan(left) & ~np.isnan(other)
-    assert alone.any() and np.isnan(other[-1]) and area[-1] == 0.0
-    assert area[alone] == pytest.approx(other[alone]) and np.isnan(run["aggregate_2_gap_um"][alone]).all()
-    assert area == pytest.approx(np.nan_to_num(left) + np.nan_to_num(other))
-    assert np.abs(run["biomass_balance"]).max() < 1e-12
-    regions = [set(np.unique(run.fields(time)["region"])) for time in (0.0, run.time[alone][0], run.time[-1])]
-    assert regions == [{0.0, 1.0, 2.0}, {0.0, 2.0}, {0.0}]
-
-
 # ---------------------------------------------------------------- files
 
 
 @pytest.mark.thorough
-def test_commands_know_bodies(tmp_path, capsys):
-    """check, run, resume to a later end, plot, compare and sweep of a file with two bodies."""
-    path = tmp_path / "two.toml"
+def test_a_sweep_and_a_comparison_know_bodies(tmp_path):
+    """`test_published.py` runs and draws two bodies, `test_resume.py` and `test_longer.py` continue such runs."""
+    path, swept = tmp_path / "two.toml", tmp_path / "swept"
     path.write_text(str(scene_of(growth={"end": "0.4 h"}, output={})))
-    one, other, page = (str(tmp_path / name) for name in ("one", "other", "page.html"))
-    assert main(["check", str(path)]) == 0
-    out = capsys.readouterr().out
-    assert "left: a half-disc of biomass of radius 12 um on the lower wall at x = -30 um" in " ".join(out.split())
-    assert main(["run", str(path), "--out", one]) == 0
-    assert main(["run", str(path), "--out", other, "--set", "aggregate.left.radius=10 um"]) == 0
-    assert main(["run", "--resume", one, "--set", "growth.end=0.6 h"]) == 0
-    assert main(["compare", one, other, "--out", page]) == 0
-    assert main(["plot", one, "aggregate_left_thickness", "--out", str(tmp_path / "a.png")]) == 0
+    assert main(["sweep", str(path), "--vary", "aggregate.left.radius=5 um, 12 um", "--out", str(swept)]) == 0
+    runs = results.read_table(swept / "table.csv")
+    assert set(runs["aggregate.left.radius_um"]) == {5.0, 12.0} and runs["aggregate_2_area_um2"].min() > 100
+    folders = sorted(map(str, swept.glob("runs/*")))
+    assert main(["compare", *folders, "--out", str(tmp_path / "page.html")]) == 0
     text = (tmp_path / "page.html").read_text()
     assert "thickness, aggregate left (um)" in text and ">12 um<" in text
-    report = (tmp_path / "one" / "report.html").read_text()
+    report = (swept / folders[0] / "report.html").read_text()
     assert "2 aggregates" in report and "Each aggregate: thinnest film" in report
-    run = repro.load_run(one)
-    assert run["aggregate_2_area_um2"][-1] > run["aggregate_2_area_um2"][0] and run.time[-1] == 0.6
-    swept = tmp_path / "swept"
-    assert main(["sweep", str(path), "--vary", "aggregate.left.radius=5 um, 8 um", "--out", str(swept)]) == 0
-    runs = results.read_table(swept / "table.csv")
-    assert set(runs["aggregate.left.radius_um"]) == {5.0, 8.0} and runs["aggregate_2_area_um2"].min() > 100
 
 
 @pytest.mark.parametrize("key, other", [("left", "1"), ("1", "left"), ("2", "2")])
@@ -425,9 +397,10 @@ def test_a_shape_is_of_one_aggregate():
 
 
 def test_a_folder_says_which_aggregates_left(tmp_path, capsys):
-    """The run goes on without them. Its end says nothing of them, so that a warning of the run names each."""
-    changes = ["numerics.preset=fast", "numerics.refinement=0.15", 'growth.end="1 h"', "growth.wall=bonded",
-               'growth.bonding_strength="4e-4 MPa"', "growth.after_detachment=continue", "output.every=1 h",
+    """The run goes on without them: their columns are empty, and sums, balances and fields lack them. Its end says
+    nothing of them, so that a warning of the run names each."""
+    changes = ["numerics.preset=fast", "numerics.refinement=0.15", 'growth.end="0.3 h"', "growth.wall=bonded",
+               'growth.bonding_strength="4e-4 MPa"', "growth.after_detachment=continue", "output.every=0.1 h",
                'aggregate=[{radius="8 um", position="-60 um", name="first"}, {radius="5 um", position="60 um"}]']
     arguments = [part for change in changes for part in ("--set", change)]
     assert main(["run", "base", "--out", str(tmp_path / "run"), *arguments]) == 0
@@ -436,3 +409,11 @@ def test_a_folder_says_which_aggregates_left(tmp_path, capsys):
     left = [warning["text"] for warning in recorded["warnings"] if warning["key"] == "growth.after_detachment"]
     assert [text.partition(" at t = ")[0] for text in left] == ["aggregate first detaches", "aggregate 2 detaches"]
     assert recorded["status"] == "completed" and all(text in written for text in left)
+    run = repro.load_run(tmp_path / "run")
+    first, second, area = (run[f"aggregate{name}_area_um2"] for name in ("_first", "_2", ""))
+    alone = np.isnan(first) & ~np.isnan(second)
+    assert alone.any() and np.isnan(run["aggregate_2_gap_um"][alone]).all() and area[-1] == 0.0
+    assert area == pytest.approx(np.nan_to_num(first) + np.nan_to_num(second))
+    assert np.abs(run["biomass_balance"]).max() < 1e-12
+    regions = [set(np.unique(run.fields(time)["region"])) for time in (0.0, run.time[alone][0], run.time[-1])]
+    assert regions == [{0.0, 1.0, 2.0}, {0.0, 2.0}, {0.0}]

@@ -8,14 +8,14 @@ from repro.fem.walls import BOTTOM, FREE, TOP
 from repro.model import growth, mechanics
 from repro.model.mechanics import supports_of
 from repro.model.meshing import seeded
-from tests.strategies import EVERY_ORDER, ORDERS, coarse_base
+from tests.strategies import EVERY_ORDER, ORDERS, coarse_base, in_um
 from verification.problems.schemes import exchange, load_scene
 
 
 def block(order, *changes):
     """(scene, seed): a block of 20 by 20 um from wall to wall."""
-    text = ", ".join(f'["{x} um", "{y} um"]' for x, y in [(-10, 0), (-10, 20), (10, 20), (10, 0)])
-    scene = load_scene("base", [f"aggregate.outline=[{text}]", 'pore.width="20 um"', "numerics.refinement=0.3",
+    outline = in_um([(-10, 0), (-10, 20), (10, 20), (10, 0)])
+    scene = load_scene("base", [f"aggregate.outline={outline}", 'pore.width="20 um"', "numerics.refinement=0.3",
                                 exchange(elements=ORDERS[order]), *changes],
                        unset=["aggregate.radius"])
     return scene, seeded(scene)

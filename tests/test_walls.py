@@ -17,7 +17,7 @@ from repro.model.mechanics import Mechanics, with_new_surfaces
 from repro.model.meshing import seeded
 from repro.preflight import numbers
 from repro.scene import load_scene
-from tests.strategies import EVERY_ORDER, coarse_base
+from tests.strategies import EVERY_ORDER, PRESET_OF, coarse_base, in_um
 
 WIDTH = 50.0
 WALLS = pytest.mark.parametrize("on", channel_walls(WIDTH), ids=["lower", "upper"])
@@ -88,10 +88,9 @@ def test_water_slips_only_along_a_wall_that_lets_it(order, number):
 
 def grown_plug(order, growth=1.05):
     """(mechanics, pore): a block from wall to wall after uneven growth, before its new shape."""
-    points = ", ".join(f'["{x} um", "{y} um"]' for x, y in [(-14, 0), (-11, 20), (10, 20), (16, 0)])
-    preset = {1: "paper", 2: "fast"}[order]
-    scene = load_scene("base", [f"numerics.preset={preset}", f"aggregate.outline=[{points}]", "pore.width=20 um",
-                                "numerics.refinement=0.3"], unset=["aggregate.radius"])
+    outline = in_um([(-14, 0), (-11, 20), (10, 20), (16, 0)])
+    scene = load_scene("base", [f"numerics.preset={PRESET_OF[order]}", f"aggregate.outline={outline}",
+                                "pore.width=20 um", "numerics.refinement=0.3"], unset=["aggregate.radius"])
     seed = seeded(scene)
     x = seed.mesh.points[seed.mesh.cells[seed.mesh.biomass, :3], 0].mean(axis=1)
     seed = seed.with_body(theta=seed.body.theta * (growth + 0.01 * x)[:, None])
@@ -121,17 +120,15 @@ def test_a_new_surface_keeps_a_point_unless_its_wall_keeps_none(number):
     assert np.count_nonzero(kept & on) == 0 and np.count_nonzero(kept) == 1
 
 
-PRESETS = {1: "paper", 2: "fast"}
-
-
 @EVERY_ORDER
 def test_a_film_closes_at_a_plane_of_symmetry_at_half_of_the_gap(order):
     """The film to the mirror image is 2.1 um thick where the gap is 1.05 um, and stays open; at 0.95 um it closes. At
     a wall both close."""
     closed = {}
     for gap, upper in product((1.05, 0.95), ("no slip", "symmetry")):
-        scene = load_scene("base", [f"numerics.preset={PRESETS[order]}", "pore.width=20 um", f"pore.upper_wall={upper}",
-                                    f"aggregate.radius={20 - gap} um", "numerics.refinement=0.5"])
+        scene = load_scene("base", [f"numerics.preset={PRESET_OF[order]}", "pore.width=20 um",
+                                    f"pore.upper_wall={upper}", f"aggregate.radius={20 - gap} um",
+                                    "numerics.refinement=0.5"])
         seed = seeded(scene)
         shape = contact.expand(Mechanics.of(scene), seed, [seed.body.theta])
         closed[gap, upper] = shape.pore.contact
@@ -177,7 +174,7 @@ def test_a_plane_of_symmetry_bears_nothing_as_a_wall(number):
 def test_the_mesh_ends_where_that_of_the_pore_with_its_mirror_image_ends(order):
     """The ends (3.1) are 1.5 widths of that pore away, where its flow is developed. A new mesh is due at its distance,
     too."""
-    changes = [f"numerics.preset={PRESETS[order]}", "aggregate.radius=20 um", "numerics.refinement=0.3"]
+    changes = [f"numerics.preset={PRESET_OF[order]}", "aggregate.radius=20 um", "numerics.refinement=0.3"]
     meshes = [seeded(load_scene("base", [*changes, *own])).mesh
               for own in (["pore.upper_wall=symmetry"], ["pore.width=100 um"], [])]
     half, whole, alone = meshes

@@ -23,7 +23,7 @@ from repro.fem import elements
 from repro.model import growth
 from repro.model.solid import Shape, Strained
 from verification.evidence.cases import parametrize
-from verification.evidence.checks import Check, around, at_most, each_at_most, largest, refine, studies, study
+from verification.evidence.checks import Check, Study, around, at_most, each_at_most, largest, refine, studies, study
 from verification.problems import bodies
 from verification.problems.bodies import Supported
 
@@ -228,6 +228,12 @@ def test_curved_half_cylinder(record):
 ROUND_OFF, STEPS = "round-off", 0.1 * 0.5 ** np.arange(4)
 
 
+def central_differences(name: str, slope: np.ndarray, value) -> Study:
+    """The study of central differences of value(s) at s = 0 against its slope."""
+    errors = [largest((value(s) - value(-s)) / (2 * s) - slope) for s in STEPS]
+    return study(name, STEPS, errors, 2, "central differences: second order")
+
+
 def admissible(count: int = 200) -> tuple[np.ndarray, np.ndarray]:
     """Random F (count, 2, 2) with shears to 3 and det F from 0.5 to 2000, and random pressures."""
     random = np.random.default_rng(1)
@@ -332,9 +338,7 @@ def test_differences(differentiated, kind, record):
 
     Norm: largest difference to central differences, by the step.
     """
-    slope, value = differentiated(*kind)
-    errors = [largest((value(s) - value(-s)) / (2 * s) - slope) for s in STEPS]
-    record(study("difference", STEPS, errors, 2, "central differences: second order"))
+    record(central_differences("difference", *differentiated(*kind)))
 
 
 @pytest.mark.case(

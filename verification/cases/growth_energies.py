@@ -11,9 +11,9 @@ from repro.errors import GrowthError
 from repro.model import growth
 from repro.model.energies import Gent
 from repro.model.solid import Strained
-from verification.cases.growth import COMPONENTS, NORM, REFINEMENTS, REPRODUCED, SECOND, STEPS
+from verification.cases.growth import COMPONENTS, NORM, REFINEMENTS, REPRODUCED, SECOND, central_differences
 from verification.evidence.cases import parametrize
-from verification.evidence.checks import around, at_least, at_most, each_at_most, largest, refine, studies, study
+from verification.evidence.checks import around, at_least, at_most, each_at_most, largest, refine, studies
 from verification.problems import bodies
 
 #: J_m. Growth by theta = 36 alone has I - 3 = 3.7; the half-cylinder below comes to 4.2.
@@ -106,8 +106,7 @@ def test_gent_differences(kind, record):
         return gent.energy(F + s * G, LIMIT) + P * (np.linalg.det(F + s * G) - 1.3)
 
     slope = np.sum(Strained(F, Gent(LIMIT)).piola(P) * G, axis=(1, 2))
-    differences = [largest((energy(s) - energy(-s)) / (2 * s) - slope) for s in STEPS]
-    record(study("stress", STEPS, differences, 2, "central differences: second order"))
+    record(central_differences("stress", slope, energy))
     body = stiffened(bodies.half_disc(0.6 if kind == 1 else 0.3, kind)[0])
     position = body.reference @ np.array([[1.1, 0.1], [0.2, 1.2]])
     pressure, theta = random.standard_normal(body.corners), random.uniform(1.1, 1.4, body.at.dx.shape)
@@ -118,8 +117,7 @@ def test_gent_differences(kind, record):
     def residual(s):
         return system.residual(position + s * move, pressure + s * push)
 
-    differences = [largest((residual(s) - residual(-s)) / (2 * s) - linear) for s in STEPS]
-    record(study("tangent", STEPS, differences, 2, "central differences: second order"))
+    record(central_differences("tangent", linear, residual))
 
 
 @pytest.mark.case("growth-gent-limit", kind="property", mutants=("gent-without-limit",), runs_with="2",

@@ -2218,7 +2218,7 @@ MUTANTS = (
          "A bonded lower wall pins the points on the upper wall too.",
          "constraints",
          "fixed = fixed | (wall.bonded & wall.holds(before[rim]))",
-         "fixed = fixed | (wall.bonded & (shape.wall != FREE))",
+         "fixed = fixed | (wall.bonded & np.isin(touched, [each.number for each in shape.walls]))",
          "tests/test_walls.py::test_a_surface_keeps_its_place_on_a_bonded_wall_alone")),
     *changes(
         "repro/model/closing_by_lines.py",
