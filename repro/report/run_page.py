@@ -118,6 +118,8 @@ def _assumed(run: Run) -> str:
     fate = "a run ends where the aggregate detaches or tears" if ends else "no detachment"
     if tables.get("growth", {}).get("after_detachment") == "continue":
         fate = "an aggregate that detaches leaves the pore"
+    if "erosion" in tables.get("growth", {}):
+        fate += ", surfaces erode"
     bodies = tables.get("aggregate")
     count = f"{len(bodies)} aggregates" if isinstance(bodies, list) else "one aggregate"
     assumptions.insert(0, f"a pore in the plane, {count}, {fate}")
