@@ -1,4 +1,4 @@
-"""The runs of the figures, computed when a build begins: a page may take 600 s, and all runs take longer on a busy machine."""
+"""The runs of the figures, computed when a build begins: on a busy machine they take longer than a page may, 600 s."""
 
 from importlib import import_module
 
