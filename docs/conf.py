@@ -30,13 +30,14 @@ include_patterns = [
 exclude_patterns = ["docs/_build", "build/[!c]*", "build/crate", "**/.*"]
 extensions = [
     "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "sphinx_design",
-    "mathml", "citations", "times", "case_sources", "scene_keys", "film",  # in docs/site
+    "mathml", "citations", "times", "case_sources", "scene_keys", "film", "figure_runs",  # in docs/site
 ]
 source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 4
 myst_title_to_header = True
+smartquotes = False  # values of keys are copied from pages
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600  # s of wall time: a loaded machine may stall

@@ -32,16 +32,19 @@ FALLING = {"conductivity_m_per_d": [100.0, 60.0, 25.0]}
      "3 rows, to t = 2 h. No aggregate touches the opposite wall. The conductivity falls from 100 to 25 m/day, by a "
      "factor of 4. The acceptor in the effluent falls from 9 to 2.25 mg/L. The donor in the effluent stays at 8 mg/L."),
     (made(conductivity_m_per_d=[100.0, 150.0], ledger={"end_h": np.array([0.5, 1.0]),
-                                                       "detached_pg_per_m": np.array([3.0, 0.0])}),
-     "2 rows, to t = 1 h. No aggregate touches the opposite wall. An aggregate leaves the pore at t = 0.5 h. The "
-     "conductivity rises from 100 to 150 m/day, by a factor of 1.5."),
+                                                       "detached_pg_per_m": np.array([3e6, 0.0])}),
+     "2 rows, to t = 1 h. No aggregate touches the opposite wall. An aggregate leaves the pore at t = 0.5 h. In all, 3 "
+     "ug/m of biomass detaches. The conductivity rises from 100 to 150 m/day, by a factor of 1.5."),
+    (made(thickness_um=[4.0, 8.0], ledger={"end_h": np.array([0.5, 1.0]), "detached_pg_per_m": np.array([3e6, 1e6])},
+          tables={"growth": {"erosion": {}}}),
+     "2 rows, to t = 1 h. No aggregate touches the opposite wall. In all, 4 ug/m of biomass detaches."),
     (made(aggregate_area_um2=[40.0, 80.0], effluent_acceptor_mg_per_L=[10.0, 10.0]),
      "2 rows, to t = 1 h. No aggregate touches the opposite wall. The acceptor in the effluent stays at 10 mg/L. The "
      "area of the aggregate rises from 40 to 80 um², by a factor of 2."),
     (made(conductivity_m_per_d=[174.0], tables={}), "One row, at t = 0 h. The conductivity is 174 m/day."),
     (made(conductivity_m_per_d=[np.nan, 8.0, 4.0, np.nan], tables={}),
      "4 rows, to t = 3 h. The conductivity falls from 8 to 4 m/day, by a factor of 2.")],
-    ids=["contact", "effluents", "leaves", "no flow", "one row", "gaps"])
+    ids=["contact", "effluents", "leaves", "erodes", "no flow", "one row", "gaps"])
 def test_the_sentence_has_contact_conductivity_and_effluents(run, expected):
     """Physics that is not modelled is not mentioned."""
     assert answer.sentence(run) == expected

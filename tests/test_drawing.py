@@ -119,3 +119,14 @@ def test_the_command_draws_the_same(results, tmp_path, capsys):
 def test_the_command_refuses_in_one_line(results, tmp_path, capsys, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
     assert message in refusal(tmp_path, capsys, "plot", results.folder, *arguments) and not list(tmp_path.iterdir())
+
+
+def test_the_command_lists_what_it_draws(capsys, tmp_path):
+    """Names and words stand in two columns, also where a name is longer than those of one aggregate."""
+    two = [{"radius": "4 um"}, {"radius": "4 um", "position": "40 um", "name": "downstream"}]
+    repro.run({"pore": {"width": "50 um"}, "aggregate": two, "flow": {"head": "1e-3 cm"}}, tmp_path / "run")
+    assert main(["plot", str(tmp_path / "run")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    drawable = repro.load_run(tmp_path / "run").drawable()
+    starts = {line.index(words) for line, words in zip(lines, drawable.values(), strict=True)}
+    assert starts == {max(map(len, drawable)) + 2} and [line.split()[0] for line in lines] == list(drawable)

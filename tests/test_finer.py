@@ -28,8 +28,10 @@ def numbers(scene):
 def test_the_finer_run_has_the_next_preset_or_smaller_elements_and_steps(preset):
     scene = load_scene("base", {"numerics.preset": preset})
     finer = refine(scene)
-    if preset in FINER:
-        assert finer == load_scene("base", {"numerics.preset": FINER[preset]})
+    if preset in FINER:  # the layers of base have elements of 0.18 in sketch
+        least = {"sketch": 0.27426723}.get(preset, PRESETS[FINER[preset]]["refinement"])
+        assert numbers(finer) == pytest.approx(PRESETS[FINER[preset]] | {"refinement": least})
+        assert finer.numerics.preset == FINER[preset] and finer.growth == scene.growth
         return
     assert finer.numerics.preset == preset and finer.numerics.scheme == scene.numerics.scheme
     assert finer.numerics.refinement == pytest.approx(1.5 * scene.numerics.refinement)
@@ -46,10 +48,21 @@ def test_a_key_that_is_as_fine_as_the_next_preset_is_refined_too():
     assert refine(load_scene("base", {"numerics.refinement": 19})).numerics.refinement == MOST_REFINED
 
 
+@pytest.mark.parametrize("preset", ["sketch", "fast", "accurate", "exact"])
+def test_elements_that_boundary_layers_make_small_are_refined_too(preset):
+    """At u W / D = 100 m/day 50 um / 0.81 cm2/day = 61.7 the layers need a refinement of 0.15 Pe^(1/3) = 0.593."""
+    scene = load_scene("base", {"flow.mean_velocity": "100 m/day", "numerics.preset": preset}, unset=["flow.head"])
+    own = max(scene.numerics.refinement, 0.15 * (1e8 * 50 / 0.81e8)**(1 / 3))
+    assert refine(scene).numerics.refinement == pytest.approx(1.5 * own)
+    assert f"({preset} (refinement {own:.3g}, " in f"({refined._describe(scene)}"
+
+
 def test_the_differences_are_those_of_two_runs():
     """Each column has the time and the values of the row that differs most."""
     compared = repro.error("base", SHORT)
-    own, finer = (repro.solve("base", SHORT | {"numerics.preset": preset}) for preset in ("sketch", "fast"))
+    elements = refine(load_scene("base", SHORT)).numerics.refinement
+    own, finer = (repro.solve("base", SHORT | changes) for changes in (
+        {}, {"numerics.preset": "fast", "numerics.refinement": elements}))
     assert (compared.time, compared.rows, compared.stopped) == (0.2, 3, "") and 0 < compared.seconds < compared.limit
     differences = {each.column: each for each in compared.differences}
     assert differences.keys() < set(own) and "donor_balance" not in differences and "contact" not in differences
@@ -64,7 +77,7 @@ def test_the_differences_are_those_of_two_runs():
     worst = differences["conductivity_m_per_d"]
     assert f"hydraulic conductivity of the pore changes by at most {worst.difference:.2g} %" in compared.sentence
     assert compared.sentence in " ".join(str(compared).split()) and "From t = 0 to 0.2 h" in compared.sentence
-    assert "from sketch (refinement 0.05, tolerance 0.01) to fast (refinement 0.2, tolerance 0.0075)" in str(
+    assert "from sketch (refinement 0.183, tolerance 0.01) to fast (refinement 0.274, tolerance 0.0075)" in str(
         compared.sentence)
 
 

@@ -198,11 +198,11 @@ def test_the_examples_of_the_tutorial_run(tmp_path, capsys, monkeypatch):
             statuses.append(status)
             assert [err.strip()] == printed_lines(block) if status else printed_lines(block) == [], err
     plt.close("all")
-    assert statuses == [0] * 6 + [2] + [0] * 6
+    assert statuses == [0] * 7 + [2] + [0] * 7
     assert load_scene("mine.toml").pore == load_scene("base").pore
     assert (tmp_path / "runs" / "narrow" / "timeseries.csv").exists()
     assert (tmp_path / "oxygen.png").stat().st_size > 1000
-    assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]
+    assert "WARNING" not in printed[3] and "contact with the opposite wall from t = " in printed[4]
 
 
 @pytest.mark.thorough

@@ -323,7 +323,8 @@ def test_the_key_that_was_set_is_named(tmp_path, source, first, second, of_first
         "flow.viscosity_ratio=1,5", "kinetics.yield_coefficient=0.5 deg")),
     *((override, ("did you mean",)) for override in (
         "pore.width=-50", "pore.width=true", "pore.width={}", "numerics.preset=7", "pore.xyzzy=5 um",
-        f"pore.width=0x{'f' * 9000}", "growth.detachment=1 1/day", "substrates.donor.supply=8 mM"))])
+        "aggregate.left=3", f"pore.width=0x{'f' * 9000}",
+        "growth.detachment=1 1/day", "substrates.donor.supply=8 mM"))])
 def test_hints_are_given_only_if_they_help(override, unsaid):
     message = refusal("base", override)
     assert not [hint for hint in unsaid if hint in message]
@@ -481,6 +482,7 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
 @pytest.mark.parametrize("text, part", [
     *((text, "not TOML: ") for text in ("a = " + "[" * 100_000, "a = " + "9" * 5000, "a = 1\na = 2")),
     ("[pore]\nwidth = 50 um\n", "line 2, column 12): width = 50 um; a value with a unit stands in quotes"),
+    ('[aggregate]\noutline = { file = "C:\\Users\\a.png" }', "; a path has / or stands in single quotes, "),
     ('[pore]\nwidth = "50 um\n', 'line 2, column 15): width = "50 um'),
     ("[pore]\r\n\r\n[pore]\r\n", "line 3, column 6): [pore]"),
     ("a = 1\nb = " + "x" * 500, "line 2, column 5): b = xxx"),

@@ -57,8 +57,10 @@ def call(options) -> int:
     if options.out is None:
         if options.field:
             options.refuse("--out FILE is needed with QUANTITY")
-        for name, words in results.drawable().items():
-            say(printable(f"{name:34}{words}"))
+        drawable = results.drawable()
+        width = max(map(len, drawable), default=0)
+        for name, words in drawable.items():
+            say(printable(f"{name:{width}}  {words}"))
         return 0
     style = {name: getattr(options, name) for name in ("log", "unit", "title", "cmap")}
     try:

@@ -2,7 +2,8 @@
 
 The finer run has the next preset. ``exact`` and the presets of the paper's scheme have none: their
 elements and steps are divided. A key of [numerics] that is already as fine as the next preset is
-refined by the same factor.
+refined by the same factor. So are elements that boundary layers make nearly as small as those of
+the next preset.
 """
 
 import textwrap
@@ -15,7 +16,7 @@ import numpy as np
 from repro import results
 from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
-from repro.model.meshing import MOST_REFINED
+from repro.model.meshing import MOST_REFINED, resolution
 from repro.polling import OutOfTime, poll, within
 from repro.preflight.checked import WIDTH
 from repro.preflight.memory import require_memory, require_outline
@@ -131,7 +132,8 @@ def error(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = ()
     -----
     The runs have the presets ``sketch`` and ``fast``, ``fast`` and ``accurate``, or ``accurate``
     and ``exact``. For the other presets the finer run has elements of 2/3 the size, and a tolerance
-    or a ``growth.time_step`` smaller in proportion to the expected error. Rows are at the scene's
+    or a ``growth.time_step`` smaller in proportion to the expected error. In fast flow the boundary
+    layers set the size of the elements; there the finer run has 2/3 of it. Rows are at the scene's
     requested times, or at 25 evenly spaced ones. A difference is relative to the value of the finer
     run in the same row. For columns that may be negative, and where that value is zero, it is
     relative to the largest value of both runs.
@@ -184,7 +186,8 @@ def refine(scene: Scene) -> Scene:
         own = getattr(numerics, key)
         following = PRESETS[preset].get(key, own)
         refined[key] = following if (following - own) * (factor - 1) > 0 else own * factor
-    refined["refinement"] = min(refined["refinement"], MOST_REFINED)
+    refined["refinement"] = min(max(refined["refinement"], FACTOR * resolution(scene)),
+                                MOST_REFINED)
     finer = replace(scene, numerics=replace(numerics, preset=preset, **refined))
     if scene.growth and not numerics.scheme.controls_error:
         step = scene.growth.time_step / FACTOR**2  # the error of an update is of order time_step
@@ -199,7 +202,7 @@ def _describe(scene: Scene) -> str:
     if scene.growth:
         step = f", tolerance {numerics.tolerance:.3g}" if numerics.scheme.controls_error else \
             f", time step {scene.growth.time_step:.3g} h"
-    return f"{numerics.preset} (refinement {numerics.refinement:.3g}{step})"
+    return f"{numerics.preset} (refinement {resolution(scene):.3g}{step})"
 
 
 class _Run:

@@ -41,8 +41,10 @@ def sentence(run: Run) -> str:
                      if touching else "No aggregate touches the opposite wall.")
     masses = run.ledger.get(DETACHED.name, np.zeros(0))
     if masses.any():
-        times = ", ".join(f"{time:.6g}" for time in run.ledger["end_h"][masses > 0])
-        parts.append(f"An aggregate leaves the pore at t = {times} h.")
+        if "erosion" not in run.record["tables"]["growth"]:
+            times = ", ".join(f"{time:.6g}" for time in run.ledger["end_h"][masses > 0])
+            parts.append(f"An aggregate leaves the pore at t = {times} h.")
+        parts.append(f"In all, {_short(masses.sum() / 1e6)} ug/m of biomass detaches.")
     changes = {"conductivity_m_per_d": "conductivity",
                **{f"effluent_{name}_mg_per_L": f"{name} in the effluent" for name in SUBSTRATES}}
     if "conductivity_m_per_d" not in columns and count > 1:

@@ -98,8 +98,10 @@ class Permeability:
 
     def __str__(self) -> str:
         biomass = self.columns["biomass_per_pore_volume"]
+        relative = self.columns["relative_permeability"]
         lines = [f"K / K0 in {len(biomass)} rows, biomass per pore volume B of {biomass.min():.3g} "
-                 f"to {biomass.max():.3g}, x = 1 - B"]
+                 f"to {biomass.max():.3g}, x = 1 - B, K / K0 of {relative.min():.3g} to "
+                 f"{relative.max():.3g}"]
         for name, fit in self.fits.items():
             constants = "".join(f", {symbol} = {value:.4g} +- {error:.2g}"
                                 for symbol, (value, error) in fit.constants.items())

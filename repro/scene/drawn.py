@@ -124,6 +124,9 @@ def _mask(drawn: Drawn, width: float) -> Shape:
     shape = unary_union(box(left, low, right, low + pixel))
     if not inside.any():
         raise Refused("the mask is empty: pixels of the aggregate are other than zero")
+    if inside[:, [0, -1]].all():
+        raise Refused("water at an end of the mask is needed: its pixels are zero, those of the "
+                      "aggregate other than zero")
     region = _only(getattr(shape, "geoms", [shape]))
     if region.interiors:
         raise Refused("a mask without holes is needed")
@@ -158,8 +161,11 @@ def _on_wall(shape: Shape, wall: str, width: float) -> tuple[tuple[float, float]
     on_wall = [y == own_level for _, y in ring]
     leaves = [k for k in range(len(ring)) if on_wall[k] and not on_wall[(k + 1) % len(ring)]]
     if len(leaves) != 1 or sum(on_wall) < 2:
+        other = "upper" if wall == "lower" else "lower"
+        elsewhere = any(y == opposite for _, y in ring) and not any(on_wall)
+        hint = f', and the other one, for which wall = "{other}" is needed' if elsewhere else ""
         raise Refused(f"one side of the polygon on its wall ({WALLS[wall]}) is needed; it touches "
-                      f"the wall in {len(leaves)} places")
+                      f"the wall in {len(leaves)} places{hint}")
     ring = ring[leaves[0]:] + ring[:leaves[0]]
     end = next(k for k, (_, y) in enumerate(ring) if k and y == own_level)
     line = ring[:end + 1]

@@ -115,7 +115,8 @@ def _line_of(text: str, message: str) -> str:
     letter = line[int(named[2]) - 1:][:1]
     line = line.strip()
     quotes = '; a value with a unit stands in quotes, such as width = "50 um"'
-    hint = quotes if BARE.search(line) else ""
+    path = "; a path has / or stands in single quotes, such as file = 'C:\\images\\colony.png'"
+    hint = quotes if BARE.search(line) else path if "\\" in line else ""
     hint = hint if letter.isascii() else f"; {odd_character(letter)}"
     return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
 

@@ -226,11 +226,11 @@ def out_of_scope(key: str) -> str:
 def elsewhere(key: str, keys: tuple[str, ...]) -> str:
     """The known keys nearest to a dotted key or to its last part, joined by "or".
 
-    Empty if there are none.
+    Empty if there are none. In another section, three letters of four are the same.
     """
     full_key = nearest(key, keys) if "." in key else ""
     lasts = [other.rpartition(".")[2] for other in keys]
-    last = nearest(key.rpartition(".")[2], lasts)
+    last = nearest(key.rpartition(".")[2], lasts, cutoff=0.75)
     same_last = [other for other, end in zip(keys, lasts) if last and end == last]
     return full_key or " or ".join(same_last)
 

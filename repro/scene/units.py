@@ -656,11 +656,14 @@ def alike(first: object, second: object) -> bool:
         return first == second
 
 
-def nearest(word: str, words: Iterable[str]) -> str:
-    """Return the word with similar letters, or with `word` as a part; empty if there is none."""
+def nearest(word: str, words: Iterable[str], cutoff: float = 0.6) -> str:
+    """Return the word with similar letters, or with `word` as a part; empty if there is none.
+
+    cutoff: similarity that it needs, as for difflib.
+    """
     folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
     parts = [other for other in folded if word in other.split("_")]
-    matches = difflib.get_close_matches(word, list(folded), n=1) or parts
+    matches = difflib.get_close_matches(word, list(folded), n=1, cutoff=cutoff) or parts
     return folded[matches[0]] if matches else ""
 
 
