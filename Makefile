@@ -106,7 +106,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@command -v "$(PYTHON)" >/dev/null || { echo "error: there is no '$(PYTHON)'; name a Python 3.11 or newer: make PYTHON=/path/to/python3 ..." >&2; exit 1; }
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: Python 3.11 or newer is needed, '$(PYTHON)' is $$("$(PYTHON)" -V 2>&1); name another: make PYTHON=/path/to/python3 ..." >&2; exit 1; }
 	@"$(PYTHON)" -c 'import venv, ensurepip' 2>/dev/null || { echo "error: '$(PYTHON)' lacks the standard modules venv or ensurepip (Debian and Ubuntu ship them as python3-venv); install them or name another: make PYTHON=/path/to/python3 ..." >&2; exit 1; }
-	@echo "Making $(VENV) with $$("$(PYTHON)" -V 2>&1) from requirements.lock; this takes about a minute."
+	@echo "Making $(VENV) with $$("$(PYTHON)" -V 2>&1) from requirements.lock; this takes 2 to 3 minutes."
 	@"$(PYTHON)" -m venv --clear $(VENV)
 	@$(PIP) --require-hashes --only-binary :all: -r requirements.lock
 	@$(PIP) --no-deps --no-build-isolation -e .

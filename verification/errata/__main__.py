@@ -20,7 +20,7 @@ Dupin, Kitanidis & McCarty (2001), paper 2001WR000306; numbers in brackets are i
 printed text, our reading with its reason, and the measured consequence. `python -m verification.errata` computes every
 number of a consequence, and writes this file.
 
-"base" is the run of section 4, "wide" that of Figure 6, both with the default settings, and deviations are from these.
+"base" is the run of section 4, "wide" that of Figure 6, both with the default settings. Deviations are from these runs.
 "At 19.2 h" means in the geometry of that time (E12). Concentrations are in K_s = 1 mg/L. The mesh error of base is
 about half a percent (E13). A smaller difference between two runs may be an effect of the mesh."""
 

@@ -111,11 +111,13 @@ def first_step(case: Cylinder, sign: float) -> list[str]:
 
 @erratum(
     "E6", "the configuration of the stabilisation in (27)",
-    printed="""The stabilisation in (27) is an integral over the elements in dv, the letter of the present volume in
-        (30), beside integrals over Omega_B0 in dV. The paper does not say to which shape h_tau and grad P belong;
+    printed="""The stabilisation in (27) is an integral over the elements in dv, which denotes the present volume in
+        (30). The other integrals of (27) are over Omega_B0 in dV. The paper does not say to which shape h_tau and grad
+        P belong;
         mu_L is the modulus at t = 0.""",
-    reading="""h, grad and dv of the present shape, and mu_L theta^(-2/3) for mu_L: the modulus of an increment of
-        the deformation there, as A = mu_L J^(-2/3) multiplies the deviatoric stress. In quantities of t = 0 this is
+    reading="""We take h, grad and dv of the present shape, and mu_L theta^(-2/3) instead of mu_L. This is the modulus
+        of an increment of the deformation there, as A = mu_L J^(-2/3) multiplies the deviatoric stress. In quantities
+        of t = 0 this is
         J^(5/3) times h^2 / (12 mu_L). The stabilised problem is then the same for small and for large growth.""",
     consequence="""
         Half-cylinder grown by theta = m (3/4 + R^2 / 2), equilibrium against the closed form, on three meshes
@@ -125,7 +127,7 @@ def first_step(case: Cylinder, sign: float) -> list[str]:
         {table}
 
         The term of t = 0 falls to {fade_36} and {fade_2000} of the matched one, so the pressure at theta = 2000 is
-        that without stabilisation. Ours has the same error at both. Positions err by at most {places} of the
+        that without stabilisation. With ours the error is the same for both m. Positions err by at most {places} of the
         radius on all meshes in all cases: the choice affects the stresses alone.""",
     quick=True)
 def stabilisation_scale() -> Numbers:
@@ -196,7 +198,7 @@ def uniform_growth() -> Numbers:
 
 @erratum(
     "E17", "the penalty (19) softens as the aggregate grows",
-    printed="(19): U = kappa/2 (J / theta - 1)^2 with a constant kappa, of which (21) is said to be the limit.",
+    printed="(19): U = kappa/2 (J / theta - 1)^2 with a constant kappa. According to the paper, (21) is its limit.",
     reading="""The multiplier of (21), as in the rest of the scheme. In (19) the counterpart of P is kappa (J / theta
         - 1) / theta. At a given pressure the relative error of the volume is P theta / kappa, so kappa would have
         to grow with theta for the same accuracy.""",

@@ -68,7 +68,7 @@ TRACTION = CHOICES["traction"].run
 
         {wide}
 
-        After contact the choice matters more than any other one of the flow.""")
+        After contact this choice matters more than any other choice of the flow.""")
 def interface_forms() -> Numbers:
     """Both forms around half-discs and through plugs of the pore's whole width."""
     width, rows = 50.0, []
@@ -216,9 +216,9 @@ def density_rms(scene, pore) -> float:
     printed="""Section 4 gives values at 19.4 h, and plots (Plate 1) biomass "before the aggregate expands".""",
     reading="""At 19.4 h = 97 x 12 min a shape update is due. Before it the shape is still that of 19.2 h, with
         the biomass that has grown since. The velocity is that of the shape. A mesh generated around it by 3.1 is
-        as long as printed (C08), which is the best evidence. Whether the printed effluents are those of the biomass of
-        19.2 h or of that grown since is not certain: raised by the paper's own 1.6 % (E18, E24), they are near the
-        former.""",
+        as long as printed (C08), which is the best evidence. It is not certain whether the printed effluents belong to
+        the biomass of 19.2 h or to that of 19.4 h. Raised by the paper's own 1.6 % (E18, E24), they are near those of
+        19.2 h.""",
     consequence="""
         The paper prints 1.5 m/d, 4.19 and 6.13, and 210 um. Base in the converged solution, with the difference of the
         effluents from the printed ones and from those raised by 1.6 %, 4.257 and 6.228:
@@ -248,9 +248,9 @@ def plotted_state() -> Numbers:
     "E13", "numbers that are not printed",
     printed="""No value is given for gamma of (35), for the constant of the Stokes stabilisation (3.2), or for
         the size of the elements.""",
-    reading="""gamma = 1; tau = h^2 / (100 nu), with nu the element's own viscosity; a tenth of the aggregate's
-        thickness, or a fourteenth of the pore's width, as the element size at the interface, which
-        `numerics.refinement` divides.""",
+    reading="""gamma = 1; tau = h^2 / (100 nu), with nu the element's own viscosity. The element size at the interface
+        is a tenth of the aggregate's thickness, or a fourteenth of the pore's width, divided by
+        `numerics.refinement`.""",
     consequence="""
         Base at 19.2 h, with one parameter changed at a time:
 
@@ -278,9 +278,9 @@ def sensitivity() -> Numbers:
 
         {table}
 
-        The explicit increment gives the printed 1.5 m/d at 19.4 h after the expansion. The paper prints another
-        state (E12), in which the increment does not give it. Nor do its effluents agree with the printed 4.19 and 6.13
-        in either state, or with 4.257 and 6.228. The integrated model hardly changes with shorter steps.""")
+        The explicit increment gives the printed 1.5 m/d at 19.4 h after the expansion. But the paper prints another
+        state (E12), in which the increment gives another velocity. Its effluents agree neither with the printed 4.19
+        and 6.13 nor with 4.257 and 6.228, in either state. The integrated model hardly changes with shorter steps.""")
 def explicit_increment() -> Numbers:
     """Base with one explicit Euler increment a shape update, against ours with both steps."""
     compared = switches.run_columns(BASE), switches.run_columns(HALF_STEP), course(BASE, explicit).columns
@@ -306,8 +306,9 @@ COLUMNS = {"mean_velocity_m_per_d": "mean velocity, m/d", "conductivity_m_per_d"
     "E20", "which point of a contact surface stays",
     printed="""2.3.3 keeps the middle point of each contact surface fixed, and does not say whether this point stays
         the same material as the surface grows.""",
-    reading="""The material point in the middle when the surface first forms (the origin, on the lower wall), for good.
-        The alternative, rechosen, takes the node nearest to the present middle at every update.""",
+    reading="""The fixed point is the material point in the middle when the surface first forms (the origin, on the
+        lower wall). It does not change. The alternative, rechosen, takes the node nearest to the present middle at
+        every update.""",
     consequence="Rechosen against kept, where growth is nearly symmetric and where it is not:\n\n{table}")
 def fixed_point() -> Numbers:
     """Base at 19.2 h and wide at 45 h with both choices."""
@@ -344,9 +345,11 @@ def new_meshes() -> Numbers:
 @erratum(
     "E26", "how the least angle and the least film are enforced",
     printed="""The minimum tangent of contact is "arbitrarily set to 0.3", and contact is enforced where the film is
-        thinner than 2 um (2.3.3). How the shape changes to satisfy both is not said.""",
-    reading="""Nodes of the free surface join the wall, from the contact line on, until what is left has at least this
-        angle and this film. No node is moved back, and the water between them leaves. With linear triangles entire
+        thinner than 2 um (2.3.3). The paper does not say how the shape changes to satisfy both.""",
+    reading="""Nodes of the free surface join the wall, from the contact line on, until the rest of the surface has at
+        least this angle and this film. No node is moved back, and the water between nodes and wall leaves. With linear
+        triangles
+        entire
         edges join, with curved ones parts of an edge.""",
     consequence="""
         The rule decides how much of the narrow wedges beside a contact is filled. Conductivity of wide in the converged

@@ -151,7 +151,7 @@ def meshed_inlet() -> Numbers:
     printed="Effluents of 4.19 and 6.13 K_s from 10 K_s each.",
     reading="""The uptake of 1 mg of donor consumes at least F mg of acceptor, and decay consumes more. According to
         section 4 the effluents must be 1.6 % higher to balance. This is the same contradiction: a numerical error of
-        the paper's own effluents, which no reading of the model removes, and which its scheme makes (E24).""",
+        the paper's own effluents. No reading of the model removes it; the paper's scheme makes it (E24).""",
     consequence="""
         Acceptor over donor consumed: {printed} from the printed effluents, less than F = 1.52, which is
         impossible if both K_s are equal; {corrected} with the paper's 1.6 % on both, within 1 % of {ours} (F and
@@ -293,7 +293,7 @@ def oxygen_supplied() -> Numbers:
 @erratum(
     "E23", "the doubling time of 3 hours is that at saturation",
     printed='"The doubling time is ~3 hours" (4).',
-    reading="That of C >> K_s, which base does not have (C09, C33).",
+    reading="The printed time is that at C >> K_s. Base does not reach such concentrations (C09, C33).",
     consequence="""
         ln 2 over the net growth rate k Y m_A m_D - b m_A: {saturated} h at saturation, {supplied} h at 10 K_s of both,
         the largest concentrations in base.""",

@@ -41,7 +41,7 @@ it."""
 UPTAKE = """## Uptake
 
 `repro.uptake(area, width, velocity, acceptor, donor)` computes the uptake of both substrates and the growth of the
-area, with the kinetics of Table 1. It has the rates (7)-(10) at one concentration of each substrate in the aggregate.
+area, with the kinetics of Table 1. It uses the rates (7)-(10) at one concentration of each substrate in the aggregate.
 That concentration is below the supply because the inflow is limited and because diffusion to the aggregate needs a
 difference; `repro/network/uptakes.py` has the equations. The range is A / W^2 to 4.5, widths of 40 to 150 um, and up
 to 10 m/d and 20 mg/L."""
@@ -50,28 +50,30 @@ to 10 m/d and 20 mg/L."""
 OWN = """## With one's own kinetics
 
 `repro.uptake(area, width, velocity, scene="mine.toml")` and `repro.added_resistance(area, width, scene="mine.toml")`
-have the kinetics, the diffusivities, the supplies and lambda of a scene. `repro network-law mine.toml`, or the first
+use the kinetics, the diffusivities, the supplies and lambda of a scene. `repro network-law mine.toml`, or the first
 call, computes their table once: half a minute to some minutes in `fast` on one core, with a bar (`progress=True` in
 Python).
 
 - The uptake is solved for 60 half-discs in pores of half to twice the scene's width, and for three states of each shape
   that the run of the scene grows, at 0.0001 to 10 m/d and 1 to 100 % of the scene's supplies. The constants of the law
-  are fitted to them, and the bound follows by the rule above. The law has these ranges; A / W^2 reaches that of the
-  run's plugs, or 1.51 if no shape of the run touches both walls. States that the elements do not resolve are left out,
-  with a warning.
-- The resistance is multiplied by r of the grown shapes over that of the law, and the bounds contain both.
-- The table is sealed JSON in `~/.cache/dupin2001-repro`, or that folder of `XDG_CACHE_HOME`. Its name is a hash of the
-  scene, the code and the versions of the packages. A damaged or foreign file is made again.
+  are fitted to them, and the rule above gives the bound. The law has these ranges; A / W^2 extends to that of the
+  run's plugs, or to 1.51 if no shape of the run touches both walls. States that the elements do not resolve are left
+  out, with a warning.
+- The resistance is multiplied by the ratio of r of the grown shapes to r of the law, and the bounds include both.
+- The table is JSON with a checksum in `~/.cache/dupin2001-repro`, or in that folder of `XDG_CACHE_HOME`. Its name is
+  a hash of the scene, the code and the versions of the packages. If the file is damaged or has another origin, it is
+  computed again.
 - Scenes need a flow, both substrates, one viscous aggregate between two walls, and Monod's law or first order. Erosion
   and detachment count only in the run that grows the shapes.
 
-1000 throats take some 110 evaluations of the rates, all throats at once: about 30 ms.
+1000 throats take about 110 evaluations of the rates, each for all throats: about 30 ms.
 The example for OpenPNM takes a scene as its argument: `python docs/howto/openpnm_network.py mine.toml`.
 
 Two scenes, with slower and faster uptake than Table 1's (`verification/network/own.py`), are judged with states of
-another seed: by their own law, and by the constants and the bound of Table 1 with the kinetics of the scene. Both hold
-for both scenes, so that Table 1's constants, which are of transport, are of use for other kinetics. That is no proof
-for a third scene. Few states are plugs, which leave their constants undetermined: the law then interpolates."""
+another seed: by their own law, and by the constants and the bound of Table 1 with the kinetics of the scene. Both
+bounds hold for both scenes. So the constants of Table 1, which describe transport, are useful for other kinetics; this
+is no proof for a third scene. Few states are plugs. If they do not determine the constants of plugs, the law
+interpolates."""
 
 
 def _values() -> str:
@@ -86,12 +88,12 @@ def _fit() -> str:
     grown = int(fit["grown"].sum())
     return f"""\
 The table, `repro/network/resistance.csv`, has r of half-discs and, after contact, the mean of the plugs grown in
-several runs. The bounds are the least and the largest r over that of the fit's {len(fit["grown"])} shapes, {grown} of
-them grown in pores of 40 to 150 um at 0.5 to 6 m/d and W^2 / 2500 (W in um) to 20 mg/L of both substrates, the others
-drawn: half-discs, bodies from 1 % thinner to 3 % thicker than a half-disc and leaning by up to 5 %, plugs with ends of
-other lengths. Grown plugs are compared with the mean of the other runs. With less substrate, diffusion limits
-growth, the aggregate is thicker before contact, and r exceeds the bounds: near contact r doubles if the thickness rises
-by some 5 %."""
+several runs. The law was fitted to {len(fit["grown"])} shapes. Its bounds are the smallest and the largest ratio of a
+computed resistance to the law among them. {grown} shapes were grown, in pores of 40 to 150 um at 0.5 to 6 m/d and W^2
+/ 2500 (W in um) to 20 mg/L of both substrates. The others were drawn: half-discs, bodies from 1 % thinner to 3 %
+thicker than a half-disc that lean by up to 5 %, and plugs with ends of other lengths. Each grown plug is compared with
+the mean of the other runs. With less substrate, diffusion limits growth, the aggregate is thicker before contact, and r
+exceeds the bounds: near contact r doubles if the thickness rises by about 5 %."""
 
 
 def _judged() -> str:
@@ -109,9 +111,10 @@ def _range_of_table() -> str:
     return f"""\
 The table has A / W^2 from {_range(False)} before contact and from {_range(True)} after it, and lambda from 100 to
 10 000. Thinner bodies follow half-discs, an empty pore adds nothing, and plugs of 1.41 to 1.6 have a wider lower bound.
-Without `spanned` the area decides the contact, and from 1.41 to 1.6 the bounds include both kinds. Elsewhere the
-function raises `ValueError` with the index of the throat; with `outside="nan"` that throat has no result. It holds
-for the paper's viscous aggregate with its own condition on the surface [E2]. With continuous traction the
+Without `spanned` the area decides whether the aggregate touches both walls; from 1.41 to 1.6 the bounds include both
+cases. Outside the table the function raises `ValueError` with the index of the throat; with `outside="nan"` that
+throat has no result. The law holds for the paper's viscous aggregate with its own condition on the surface [E2]. With
+continuous traction the
 resistance of a half-disc differs by 0.2 %, that of a plug by 8 to 17 %."""
 
 
@@ -119,13 +122,14 @@ def _fit_of_uptake() -> str:
     """The states behind the law of uptake."""
     seen = uptakes.read(uptakes.FIT)
     return f"""\
-`python -m verification.network uptake` solves states that a seed draws and fits the constants of the law to them:
+`python -m verification.network uptake` solves states drawn by a seed, and fits the constants of the law to them:
 {_numbers(seen)}. Shapes do not change in a state; velocities are
 {uptakes.VELOCITIES[0]:g} to {uptakes.VELOCITIES[1]:g} m/d,
 supplies {uptakes.SUPPLIES[0]:g} to {uptakes.SUPPLIES[1]:g} mg/L.
 The bound is {FACTOR:g} times the largest error of the fit, {100 * UPTAKE_BOUND:.3g} %; before contact it is
-more for a thick body in a fast flow, by a factor of 1 + {FAST:g} (Pe A / W^2)^2. This rule precedes the solution of
-the states below. The factor is from an earlier fit, with bounds of 5 % and, since one of 50 states had 5.9 %, of 7 %.\
+larger for a thick body in a fast flow, by a factor of 1 + {FAST:g} (Pe A / W^2)^2. We wrote this rule before we solved
+the states below. The factor is from an earlier fit. Its bound was 5 %, and 7 % after one of 50 states had an error of
+5.9 %.\
 """
 
 
@@ -136,7 +140,7 @@ def _judged_uptake() -> str:
     worst_state = (apart / bounds).argmax()
     return f"""Another seed draws {len(bounds)} other states: {_numbers(new)}.
 {int((apart <= bounds).sum())} are within the bound; half of them are within {100 * np.median(apart):.2g} % of the law.
-The worst is {100 * apart[worst_state]:.1f} % from it, where the bound is {100 * bounds[worst_state]:.0f} %."""
+The worst differs by {100 * apart[worst_state]:.1f} % from it, with a bound of {100 * bounds[worst_state]:.0f} %."""
 
 
 def _own() -> str:
@@ -158,7 +162,7 @@ def _example() -> str:
     return f"""\
 `make network` runs `docs/howto/openpnm_network.py`: 100 throats in OpenPNM with both laws, over 48 h. Its flow falls to
 {ratios[step]:.3g} of the first; a step of {half:g} h instead of {step:g} h changes this by {change:.1g}.
-No throat spans its width by then."""
+Until then no aggregate spans its throat."""
 
 
 def _throats() -> str:
@@ -170,21 +174,22 @@ def _throats() -> str:
     resistance, _ = runs.laws_at_the_runs()
     return f"""## Ten throats as whole runs
 
-This test says little of the law after contact: the bounds of the flow reach from {widest[0]:+.0f} to
-{widest[1]:+.0f} %, no throat spans its width, and r of {int((~resistance.holds).sum())} of {resistance.holds.size}
+This test says little about the law after contact: the bounds of the flow reach from {widest[0]:+.0f} to
+{widest[1]:+.0f} %, no aggregate spans its throat, and r of {int((~resistance.holds).sum())} of {resistance.holds.size}
 states is outside the bounds of its own law.
 
 `python -m verification.network throats` runs ten throats of this network in the preset `fast`, with the head loss and
 the supplies that they have in the example. `verification/network/throats.py` has the rule that chooses them, and the
-bounds of the law over a history, which precede the runs: those of resistance and uptake, compounded over the growth.
+bounds of the law over a history: those of resistance and uptake, compounded over the growth. Both were written before
+the runs.
 The law is advanced in steps of 6 min. Errors of the law relative to the run at 48 h, with the bounds of the error:
 
 {_errors(compared)}
 
 {int(compared.holds.sum())} of {compared.holds.size} values at {_list(throats.TIMES)} h are within the bounds:
 {verdict}. Over these times the error of the area is {area:.2g} % at most, that of the flow {flow:.2g} %, that of
-the uptakes {max(uptake):.2g} %. The last column is the area in the example, whose step of
-{histories.STEPS[0]:g} h adds an error of its own."""
+the uptakes {max(uptake):.2g} %. The last column is the error of the area in the example; its step of
+{histories.STEPS[0]:g} h adds to the error."""
 
 
 def _widest(compared: runs.Comparison) -> tuple[float, float]:
@@ -219,14 +224,14 @@ def _laws_apart() -> str:
     resistance, uptake = runs.laws_at_the_runs()
     factor = (resistance.run / resistance.law)[~resistance.holds]
     outside = "" if resistance.holds.all() else (
-        f" In the others r is {factor.min():.2f} to {factor.max():.2f} times that of the law. Their\nA / W^2 is "
+        f" In the other states r is {factor.min():.2f} to {factor.max():.2f} times that of the law. Their\nA / W^2 is "
         f"{resistance.share[~resistance.holds].min():.2f} or more, and {_range_words(resistance)} the range of "
         "velocities and supplies of the\nshapes behind the law: there the law of resistance does not hold. "
         + _controls())
     counts = [f"{int(one.holds.sum())} of {one.holds.size}" for one in (uptake, resistance)]
     return f"""\
-At the area and the velocity of a run the laws alone can be compared with it. Of the uptakes {counts[0]} are within the
-bound of their law, of r {counts[1]}.{outside}"""
+Here the laws are compared with the runs at the area and the velocity of each run. {counts[0]} uptakes are within the
+bound of their law, and {counts[1]} values of r.{outside}"""
 
 
 def _controls() -> str:
