@@ -226,7 +226,7 @@ def test_a_resume_under_other_conditions_is_reported(key, tmp_path, monkeypatch,
     recorder.write_record("running")
     before = read_record(tmp_path)
     present = {**before["conditions"], "threads": {"OMP_NUM_THREADS": "7"}}
-    monkeypatch.setattr(execution, "conditions", lambda: present)
+    recorder.conditions = present
     assert execution._find_changes(before, recorder, execution.DEFAULT_WATCH) == {} and not recwarn.list
     if key == "scipy":
         faults.replace_version(monkeypatch, key)

@@ -75,7 +75,7 @@ def _substrate_balance(k: int, scene: Scene, at: Report) -> float:
                for ledger in at.ledgers]
     if not stores:
         flux = at.solved.fluxes[k]
-        defects.append(balance.defect(flux.supplied, flux.out, flux.consumed, floor))
+        defects.append(balance.defect(flux.supplied, flux.out, flux.consumed, least_scale=floor))
     return _worst(defects)
 
 

@@ -16,9 +16,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("model/transport.py", "return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))",
      "return self._reaction.evaluate(state.reshape(len(self.problem.both), - 2))"):
         "NumPy infers the length of an axis from any negative number.",
-    ("report/quantities.py", 'run.series.get("remeshed", run.times * 0) == 1',
-     'run.series.get("remeshed", run.times * 0) >= 1'):
-        "The column is 0 or 1.",
     ("model/growth.py", "MOST_ITERATIONS = 25", "MOST_ITERATIONS = 24"):
         "Identical outputs of base in the three presets, whose equilibria take at most 5, 5 and 3 iterations.",
     ("runs/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
