@@ -43,7 +43,7 @@ CHARTS = {
     "Force of the fluid on the aggregate": {"force x": "fluid_force_x_uN_per_m", "force y": "fluid_force_y_uN_per_m"},
     "Defects of the balances": {"acceptor": "acceptor_balance", "donor": "donor_balance",
                                 "biomass": "biomass_balance", "oxygen demand": "oxygen_demand_balance"},
-    "Mesh": {"nodes": "nodes", "new mesh": "remeshed"},
+    "Mesh": {"nodes": "nodes"},
 }
 AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm)", "Effluents": "(mg/L)",
          "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)",

@@ -130,8 +130,7 @@ def test_runs_are_compared_under_their_own_names_with_signs():
     labels = comparison.short([run.folder for run in runs])
     for chart in quantities.overlaid(runs, labels):
         assert [line.label for line in chart.lines] == labels, chart.title
-        if chart.title != "Mesh: new mesh":
-            assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
+        assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
     assert comparison.differences(runs) == [("factor", "1", "1", "2")]
     page_text = comparison.build(runs)
     assert page_text.count("completed to t = 3 h") == 3

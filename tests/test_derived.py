@@ -688,8 +688,7 @@ def test_every_line_of_every_chart_is_the_column_that_it_names():
     run = distinct_run()
     charts = {chart.title: chart for chart in quantities.charts_of(run)}
     assert charts.keys() == {*CHARTS, *LEDGERS, "Ledger: biomass"}
-    new_meshes = {"remeshed": np.where(run.series["remeshed"] == 1, run.series["nodes"], np.nan)}
-    known = {name: 1e-6 * values / [1, 2] for name, values in run.ledger.items()} | run.series | new_meshes
+    known = {name: 1e-6 * values / [1, 2] for name, values in run.ledger.items()} | run.series
     for title, columns in (CHARTS | LEDGERS).items():
         chart, of_steps = charts[title], title in LEDGERS
         assert chart.axis.endswith("(ug/m/h)" if of_steps else AXES.get(title, "")), title
