@@ -29,11 +29,11 @@ def test_a_shape_without_equilibrium_under_the_forces_is_refused(order):
         contact.expand(Mechanics.of(scene), seed, [1.1 * seed.body.theta])
 
 
-@pytest.mark.parametrize("noise, agrees", [(1e-2, True), (1.0, False)])
+@pytest.mark.parametrize("noise, agrees", [(0.1, True), (1.0, False)])
 @EVERY_ORDER
 def test_rounds_that_do_not_reduce_the_move_end(monkeypatch, order, noise, agrees):
-    """Forces that change at random at every node move the nodes by 3e-5 of the thickness times the noise. Below 1e-6
-    this counts as round-off, above it an error gives advice."""
+    """Forces that change at random at every node move the nodes by 3e-6 to 2e-5 of the thickness times the noise. Below
+    1e-6 this counts as round-off, above it an error gives advice. The last round moves them by 2.6e-7 and 2.6e-6."""
     exact, random = traction.forces, np.random.default_rng(1)
 
     def noisy(*at):
