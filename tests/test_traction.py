@@ -3,6 +3,7 @@ runs with them."""
 import numpy as np
 import pytest
 
+from repro import simulate
 from repro.errors import GrowthError, StageError
 from repro.fem.walls import TOP
 from repro.march.stepping import LANDED
@@ -27,6 +28,16 @@ def test_a_shape_without_equilibrium_under_the_forces_is_refused(order):
     scene, seed = dense_base(order, "1e9 mg/cm^3")
     with pytest.raises(StageError, match="try a|crosses itself"):
         contact.expand(Mechanics.of(scene), seed, [1.1 * seed.body.theta])
+
+
+@EVERY_ORDER
+def test_the_first_row_is_in_equilibrium_under_the_forces(order):
+    """The water moves the downstream tip by 0.012 um."""
+    scene, seed = dense_base(order, "1e7 mg/cm^3")
+    first = next(simulate(scene)).pore.boundary
+    alone = contact.expand(Mechanics.of(scene), seed, [seed.body.theta]).pore.boundary
+    assert first.downstream == pytest.approx(alone.downstream, abs=1e-6)
+    assert first.downstream - seed.boundary.downstream > 5e-3
 
 
 @pytest.mark.parametrize("noise, agrees", [(0.1, True), (1.0, False)])

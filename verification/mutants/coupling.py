@@ -807,7 +807,7 @@ end = grown.step.pore"""),
          "    state = replace(state, pore=contiguous(pore))",
          "if pore is not state.pore:\n"
          "    state = replace(state, pore=contiguous(pore))",
-         f"{ENDS}a_row_at_a_jump_has_the_state_just_after_it"),
+         "tests/test_traction.py::test_the_first_row_is_in_equilibrium_under_the_forces[2]"),
         ("ends-of-steps-alone",
          "An end of the model is at the end of the step that passes it.",
          "_advance",

@@ -169,12 +169,13 @@ MUTANTS = (
          "poiseuille_loss(beyond, mesh.whole_width)",
          "poiseuille_loss(0 * length, mesh.whole_width)")),
     *changes(
-        "repro/march/stepping.py",
+        "repro/march/loop.py",
         ("family-rows-end-steps",
          "Steps end at reported times.",
-         "_find_step",
-         "remaining = corner - previous.time",
-         "remaining = min([corner, *(t for t in scene.output.times or () if t > previous.time)]) - previous.time")),
+         "_advance",
+         "stepping.advance(stages, pore, solved, state.step_control)",
+         "stepping.advance(replace(stages, growth=replace(stages.growth, end=min([stages.growth.end, *(\n"
+         "    time for time in course.rows if time > pore.time + SAME_TIME)]))), pore, solved, state.step_control)")),
     *changes(
         "repro/fem/outline.py",
         ("outline-tips-ungraded",
