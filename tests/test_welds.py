@@ -168,6 +168,7 @@ WITHOUT = {
     "one wall": (['aggregate=[{radius="5 um"}, {radius="5 um", position="40 um"}]'], "only two aggregates on opposite"),
     "alone": (['aggregate={radius="5 um"}'], "only two aggregates on opposite walls can join"),
     "paper": (["numerics.preset=paper"], "a weld needs the curved elements and the midpoint rule of the preset fast"),
+    "bonded": (["growth.wall=bonded"], 'growth.wall is "bonded"'),
     "forces": (["growth.fluid_forces=included"], 'growth.fluid_forces is "included"'),
     "erosion": (["growth.new_biomass=stress_free", 'growth.erosion.speed="0.1 um/h"'], "the aggregates erode")}
 

@@ -386,8 +386,8 @@ class Growth:
     meeting: str = choice(
         "weld", "end", source="Section 5, without a model",
         about="Two aggregates that meet join and share their motion from then on, or end the run. "
-              "A weld needs two of them on opposite walls and curved elements, without erosion and "
-              "fluid forces; otherwise a meeting ends the run")
+              "A weld needs two of them on opposite walls along which they slide, and curved "
+              "elements, without erosion and fluid forces; otherwise a meeting ends the run")
     until: str = choice(
         "end", "steady",
         about="The run goes on to end, or ends early if the aggregates are steady")
@@ -627,6 +627,7 @@ class Scene:
             "only two aggregates on opposite walls can join": not opposite,
             "a weld needs the curved elements and the midpoint rule of the preset fast":
                 not (scheme.controls_error and scheme.follows_layers),
+            'growth.wall is "bonded"': growth.bonded,
             'growth.fluid_forces is "included"': growth.has_fluid_forces,
             "the aggregates erode": growth.erosion is not None}
         return next((reason for reason, applies in reasons.items() if applies), "")

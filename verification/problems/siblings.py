@@ -74,9 +74,8 @@ def draw_sibling(number: int) -> Sibling:
 
 #: Pairs that face each other: their number, the sum of both radii and that of the smaller one over the width and the
 #: sum, and the shift along the pore over the smaller radius.
-PAIR_SEED, PAIRS = 47, 12
+PAIR_SEED, PAIRS = 47, 8
 FILLED, SMALLER, SHIFT = (0.55, 0.9), (0.3, 0.5), (0.0, 1.0)
-PAIR_KINDS = ((), ("growth.wall=bonded",))
 
 
 def draw_pair(number: int) -> Sibling:
@@ -87,7 +86,7 @@ def draw_pair(number: int) -> Sibling:
     radii = width * draw.uniform(*FILLED)
     smaller = radii * draw.uniform(*SMALLER)
     seeds = ((smaller, smaller * draw.uniform(*SHIFT), "upper"), (radii - smaller, 0.0, "lower"))
-    return Sibling(number, width, supply, family.DRIVES[draw.integers(3)], seeds, PAIR_KINDS[draw.integers(2)])
+    return Sibling(number, width, supply, family.DRIVES[draw.integers(3)], seeds, ())
 
 
 def run_sibling(sibling: Sibling) -> dict:
