@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 
-from repro.errors import SimulationError
+from repro.errors import SimulationError, printable
 from repro.fem.linear import Method
 from repro.march.state import stopping
 from repro.model.meshing import seeded
@@ -46,7 +46,7 @@ class SceneCheck:
     outlook: Outlook | None = None
 
     def __str__(self) -> str:
-        lines = [f"{self.scene}: can be run", "", "Model"]
+        lines = [f"{printable(self.scene)}: can be run", "", "Model"]
         for section, words in self.modelled:
             lines += textwrap.wrap(words, WIDTH, initial_indent=f"  {section:12}",
                                    subsequent_indent=" " * 14)
@@ -70,7 +70,7 @@ class SceneCheck:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        return (f"<Check of {self.scene}: it can be run, {len(self.warnings)} warnings, "
+        return (f"<Check of {printable(self.scene)}: it can be run, {len(self.warnings)} warnings, "
                 f"{self.nodes} nodes at t = 0>")
 
     def tables(self) -> dict:
