@@ -31,7 +31,7 @@ def _request(name: str, drive: str) -> Request:
     flow, end = DRIVES[drive]
     label = f"{name.replace(' ', '_')}_{drive}"
     return Request("base", (FAST, seeds(ARRANGEMENTS[name], RADIUS), f"flow={flow}", f'growth.end="{end} h"',
-                            'output.every="1 h"'), label)
+                            "growth.meeting=end", 'output.every="1 h"'), label)
 
 
 KEYS = [(name, drive) for name in ARRANGEMENTS for drive in DRIVES]
@@ -122,8 +122,8 @@ def caption(*folders: Path) -> str:
     published = " to ".join(f"{100 * loss:.0f}" for loss in PUBLISHED)
     return ("The pore of Base with one to eight seeds of the same total area (preset `fast`). (a) The seeds. (b) "
             "Conductivity over that of the clean pore, against the area of all aggregates. Curves of aggregates that "
-            f"face each other ({' and '.join(ends)}) end where two of them meet: the model has no law for what "
-            f"follows. (c) At an area of {COMPARED:g} W² the loss is: {stated}. So the same biomass leaves "
+            f"face each other ({' and '.join(ends)}) end where two of them meet (growth.meeting = \"end\"). "
+            f"(c) At an area of {COMPARED:g} W² the loss is: {stated}. So the same biomass leaves "
             f"{factor:.1f} times as much conductivity as {least} than as {most}. The drive changes a loss by "
             f"{100 * apart:.1f} percentage points at most. In micromodels Jiao et al. (2025) measured losses of "
             f"{published} % at nearly equal amounts of biomass, depending on where it sat: the band.")
