@@ -63,5 +63,6 @@ def test_results_without_a_scene_are_written(tmp_path):
     """Made by hand, with all columns, and with bytes that are no text in their status."""
     by_hand = repro.Results("mine", [dict.fromkeys(results.COLUMNS, 1.0)], [], "failed: \udcff")
     dataset = content(by_hand, tmp_path / "mine.nc")
+    assert by_hand.to_xarray().attrs["status"] == by_hand.status
     assert {variable.attrs["units"] for variable in dataset.variables.values()} == UNITS
     assert dataset.attrs["status"] == "failed: \\udcff" and "versions" not in dataset.attrs

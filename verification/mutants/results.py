@@ -1108,7 +1108,7 @@ MUTANTS = (
          "The last steps are adjusted to the time until the end.",
          "_find_step",
          "remaining = corner - previous.time",
-         'remaining = min(corner, needed(scene.growth, "[growth]").end) - previous.time',
+         "remaining = min(corner, stages.growth.end) - previous.time",
          BEFORE_END),
         ("shorter-than-the-shortest",
          "Steps become shorter than the shortest length to meet a tolerance.",
@@ -1342,7 +1342,7 @@ MUTANTS = (
          "Balance._predicted",
          "about = np.minimum(iterate.saturations, LARGEST_SATURATION)",
          "about = iterate.saturations",
-         "tests/test_transport.py::test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front[1e-17-1]")),
+         "tests/test_transport.py::test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front[1e-300-1]")),
     *changes(
         "repro/march/balance.py",
         ("balances-without-a-floor",
