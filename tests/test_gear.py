@@ -176,7 +176,8 @@ def test_uptake_where_a_substrate_is_negative_has_the_slope_of_its_law(species, 
     fields[species] = -10.0
     try:
         with np.errstate(all="raise"):
-            secant, slope = (gear._sink(system, pore.active, fields, species, positive)[0] for positive in (True, False))
+            secant, slope = (gear._sink(system, pore.active, fields, species, positive)[0]
+                             for positive in (True, False))
     except FloatingPointError as error:
         pytest.fail(str(error))
     assert np.array_equal(secant, slope) and secant.max() > 0
