@@ -131,7 +131,8 @@ def hashes_of(folder, monkeypatch, texts):
 
 def test_the_hash_covers_every_statement_that_computes_numbers(tmp_path, monkeypatch):
     """Each text of a module has its own hash, and so has a module of another name."""
-    names = ("scene/keys.py", "fem/mesh.py", "model/flow.py", "model/more/deep.py", "results/columns.py")
+    names = ("scene/keys.py", "fem/mesh.py", "model/flow.py", "model/more/deep.py", "schemes/paper.py", "march/loop.py",
+             "results/columns.py")
     texts = [(name, text) for name in names for text in ("a = 1", "a = 2", "a = '# 2'", 'a = """\n# 2"""')]
     assert len({*hashes_of(tmp_path, monkeypatch, texts)}) == len(texts)
     (tmp_path / "model/flow.py").rename(tmp_path / "model/glow.py")

@@ -65,20 +65,3 @@ def test_sibling(number, record):
     print(json.dumps(row))
     failed = row["verdict"] in (family.FAILED, family.UNCONFIRMED)
     record(at_most(f"{row['verdict']}: {row['status'][:300]}" if failed else "failures", failed, 0, "see the claim"))
-
-
-@pytest.mark.case(
-    "hard-pairs", **SIBLING | {
-        "claim": "Pairs of aggregates that face each other in pores 25 to 100 um wide weld, and go on far past their "
-                 "meeting: each reaches its end, the pore's end, or a fold that an independent stretch from its files "
-                 "confirms",
-        "norm": "pairs that stop otherwise, or whose fold is not confirmed",
-        "omitted": "other presets: see coupling-weld", "mutants": ("weld-slips",)})
-@pytest.mark.slow
-@pytest.mark.parametrize("number", range(siblings.PAIRS), ids=lambda number: f"pair {number}")
-def test_pair(number, record):
-    """Run a pair. A failure shows its row of the record."""
-    row = siblings.run_sibling(siblings.draw_pair(number))
-    print(json.dumps(row))
-    failed = row["verdict"] not in (family.ARRIVES, family.PORE_END, family.FOLD)
-    record(at_most(f"{row['verdict']}: {row['status'][:300]}" if failed else "failures", failed, 0, "see the claim"))

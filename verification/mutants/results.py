@@ -2549,10 +2549,10 @@ MUTANTS = (
          "moved if not moved.turned_over().any() else None",
          f"{NEW_MESH}a_new_mesh_is_due_if_one_criterion_requires_it"),
         ("front-coarser-later",
-         "After t = 0 elements at a front are halved only once.",
+         "After t = 0 elements at a front are not halved.",
          "remesh",
          "rules.meshing.around(outlines or expanded.outlines, expanded.front)",
-         "rules.meshing.around(outlines or expanded.outlines, min(expanded.front, 2.0))",
+         "rules.meshing.around(outlines or expanded.outlines, 1.0)",
          DEEPEST)),
     *changes(
         "repro/sweeps/table.py",
