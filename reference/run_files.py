@@ -350,7 +350,7 @@ class Run:
 
     @property
     def departures(self) -> list[float]:
-        """Times (h) at which the fields have an aggregate less than in the row before."""
+        """Times (h) of the rows with fewer aggregates than the row before."""
         present = [fields.present for fields in self.fields]
         return [fields.time for fields, now, before in zip(self.fields[1:], present[1:], present) if now < before]
 
@@ -365,9 +365,9 @@ class Run:
         return self.ledger["end_h"] - self.ledger["start_h"]
 
     def at_ledger(self) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of the rows at which a step ends, and of these steps."""
+        """Indices of the rows at which a step ends with biomass in the pore, and of these steps."""
         distances = np.abs(np.subtract.outer(self.times, self.ledger.get("end_h", np.zeros(0))))
-        return np.nonzero(distances <= 1e-9)
+        return np.nonzero((distances <= 1e-9) & (self.ledger.get("biomass_after_pg_per_m", np.zeros(0)) > 0))
 
 
 def findings(run: Run) -> Iterator[Finding]:
@@ -587,7 +587,7 @@ def _steps(run: Run) -> Iterator[Finding]:
     area = run.series["aggregate_area_um2"]
     yield size("biomass at t = 0 over X_m times the area, less one", before[0] / (dense * area[0]) - 1, SUM,
                "X_A + X_I = X_m")
-    rows, steps = (numbers[after[run.at_ledger()[1]] > 0] for numbers in run.at_ledger())
+    rows, steps = run.at_ledger()
     bound = STRAIGHT_AREA if run.fields[0].straight else SOLVED
     yield size("biomass over X_m times the area of the row, less one", after[steps] / (dense * area[rows]) - 1, bound,
                "(24) and (28): biomass has the density X_m in the mean")
@@ -688,7 +688,6 @@ def _growth(run: Run) -> Iterator[Finding]:
                  _least_decay(run) - slack - SOLVED * terms, _max_decay(run) * (1 + SOLVED) + slack,
                  "f_d b m_A X_A, from zero to that at the supply; f_d b X_A at the least X_A where m_A = 1 in decay")
     rows, steps = run.at_ledger()
-    rows, steps = rows[after[steps] > 0], steps[after[steps] > 0]
     inert = run.series["inert_fraction"][rows] * after[steps]
     first_inert = run.series["inert_fraction"][0] * before[0]
     share = (1 - law["degradable_fraction"]) * law["decay_coefficient"]

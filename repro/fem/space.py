@@ -214,7 +214,7 @@ class Lumped:
 
     def gain(self, region: Region, before: np.ndarray, after: np.ndarray,
              maximum_density: float) -> np.ndarray:
-        """Return the (t, 1) factor by which an aggregate expands between two masses (r, 1).
+        """Return the factor (t, 1) by which an aggregate with masses (r, 1) expands in a step.
 
         New mass takes the area that it needs at the maximum density (X_m, mg/L).
         """
@@ -273,7 +273,7 @@ class Quadrature:
 
     def gain(self, region: Region, before: np.ndarray, after: np.ndarray,
              maximum_density: float) -> np.ndarray:
-        """Return the (t, q) factor by which an aggregate expands between two masses (r, q).
+        """Return the factor (t, q) by which an aggregate with masses (r, q) expands in a step.
 
         Each point expands as its mass grows.
         """

@@ -24,7 +24,7 @@ from verification.evidence.checks import Check, at_most
 from verification.problems import hostile
 from verification.problems.hard import TooLong, limited
 
-#: Processor time (s) of one run for each aggregate: a hundred times the median.
+#: Limit of the processor time (s) of a run, for each of its aggregates: a hundred times the median.
 LIMIT = 30.0
 #: Members, of which the last 30 have several aggregates.
 MEMBERS = 220

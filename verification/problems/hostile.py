@@ -2,9 +2,9 @@
 
 They have tables that jump, odd outlines, permeable bodies, transient substrates, soft bodies under the flow, closed
 pores, starved seeds, dense rows, still water or contact. From :data:`FIRST_LATER` on they have one substrate alone,
-another law of uptake, unlimited decay or a bonded wall. From :data:`FIRST_BODIES` on they have several aggregates, that
-may meet, leave or erode. ``scene(seed)`` gives the tables of a scene as in TOML, each value a text with its
-unit. Seeds take the kinds of :data:`KINDS`, then those of :data:`LATER`, and then those of :data:`BODIES`, in turn.
+another law of uptake, unlimited decay or a bonded wall. From :data:`FIRST_BODIES` on they have several aggregates.
+These may meet, leave the pore or erode. ``scene(seed)`` gives the tables of a scene as in TOML, each value a text with
+its unit. Seeds take the kinds of :data:`KINDS`, then those of :data:`LATER`, and then those of :data:`BODIES`, in turn.
 """
 
 from collections.abc import Callable
