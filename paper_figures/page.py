@@ -52,8 +52,7 @@ def page(entries: list[Entry], endings: Iterable[str]) -> str:
 <p>Pore-scale modeling of biological clogging due to aggregate expansion: a material mechanics approach, Water
 Resources Research, paper 2001WR000306. All numbers on this page are read from the runs behind it. <b>Figure 1</b> of
 the paper is a photograph of an experiment and cannot be regenerated. Claims are judged by <code>make claims</code>,
-with verdicts as recorded in <code>verification/claims/claims.json</code>. A redefined claim counts with the verdict of
-its first definition; the later verdict stands beside it.</p>
+with verdicts as recorded in <code>verification/claims/claims.json</code>, whose rows keep former verdicts.</p>
 <nav>{links}</nav>
 <ul class="note">{"".join(f"<li>{escape(ending)}</li>" for ending in endings)}</ul>
 {"".join(map(_section, entries))}</body>

@@ -142,9 +142,9 @@ def body_forces() -> Finding:
     pairs = {f"wide, {hour} h": (plug, hour) for hour in (34, 40)} | {f"base, {PLOTTED:g} h": (open_pore, PLOTTED)}
     checks, notes = [], []
     for name, (pair, hour) in pairs.items():
-        slide, in_place, moved = outline_shift(pair[1], hour, pair[0])
+        shift, in_place, moved = outline_shift(pair[1], hour, pair[0])
         changed = abs(conductivity_change(pair[1], (hour,), pair[0]))
-        notes.append(f"{name} slides {slide:+.1f} um")
+        notes.append(f"{name} {shift:+.1f} um")
         checks += [at_least(f"{name}: {quantity} (%)", "may lead to differences", value, 100 * FEW,
                             f"more than {FEW_WORDS}") for quantity, value in (
                                 ("conductivity", changed), ("outlines moved onto each other", moved),
@@ -152,4 +152,5 @@ def body_forces() -> Finding:
     checks.append(at_least("the most of these differences (%)", "may lead to any difference",
                            max(check.value for check in checks), 100 * TRANSPORT, "the paper's accuracy of transport"))
     return Finding(tuple(checks), reason="no difference exceeds a few percent",
-                   change="the permeability W^2 / (12 lambda) is not the paper's", note="; ".join(notes) + ".")
+                   change="the permeability W^2 / (12 lambda) is not the paper's",
+                   note=f"Shift downstream by which both outlines overlap most: {'; '.join(notes)}.")

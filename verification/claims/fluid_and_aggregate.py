@@ -81,7 +81,7 @@ class Forces:
         return (self.head + self.shear) / self.stiffness
 
 
-#: Hours of wide around contact and after it; a plug slides by the last one.
+#: Hours of wide around contact and after it.
 HOURS = (34, 35, 40, 42)
 #: Wide with rows at HOURS, without and with the fluid's forces.
 UNFORCED = ("wide", *until(*HOURS))
@@ -112,21 +112,21 @@ def fluid_forces() -> Finding:
               f"the constant mean velocity through the plug; growth's shear stress is {last.growth:.3g} Pa, and the "
               f"stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa. The forces are not small as "
               f"stresses, but they change the conductivity by {most:.1g} % at most")
-    changes = "; ".join(f"{hour} h: {effect['conductivity']:+.2f} %, {effect['slide']:+.1f} um"
+    changes = "; ".join(f"{hour} h: {effect['conductivity']:+.2f} %, {effect['shift']:+.1f} um"
                         for hour, effect in effects.items())
     note = (f"In base at {UPDATE} h, when growth has hardly begun, the first ratio is {early.against_growth:.2g}, but "
-            f"the strain {early.strain:.1g}. Wide with the fluid's forces, change of the conductivity and slide "
-            f"downstream: {changes}.")
+            f"the strain {early.strain:.1g}. Wide with the fluid's forces, change of the conductivity, and shift "
+            f"downstream by which both outlines overlap most: {changes}.")
     return Finding(tuple(checks), reason=reason, note=note)
 
 
 def effect_of_forces(hour: float) -> dict[str, float]:
     """Changes (%) of wide at an hour by the fluid's forces: conductivity, area and outlines, moved onto each other and
-    where they lie; and the slide of the aggregate downstream (um)."""
-    slide, in_place, moved = outline_shift(FORCED, hour, UNFORCED)
+    where they lie; and the shift downstream (um) by which the outlines overlap most."""
+    shift, in_place, moved = outline_shift(FORCED, hour, UNFORCED)
     areas = [body(run, hour).outline.area for run in (UNFORCED, FORCED)]
     return {"conductivity": conductivity_change(FORCED, (hour,), UNFORCED), "area": 100 * (areas[1] / areas[0] - 1),
-            "outlines moved onto each other": moved, "outlines where they lie": in_place, "slide": slide}
+            "outlines moved onto each other": moved, "outlines where they lie": in_place, "shift": shift}
 
 
 def forces(aggregate: Body) -> Forces:

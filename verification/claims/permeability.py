@@ -61,8 +61,8 @@ ORDER = "an order of magnitude"
 AS_TENFOLD = "the mean slope with which a quarter more biomass leaves a tenth of the conductivity"
 
 
-@claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore (at constant velocity; C43 at "
-       "constant head)", date="2026-11-29 23:11", **ABOUT_WIDE)
+@claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore (at constant velocity; C43 has "
+       "the numbers at constant head)", date="2026-11-29 23:11", **ABOUT_WIDE)
 def spanning() -> Finding:
     """Conductivity of `wide` against its biomass up to contact. At contact it is that of the first shape in which a
     film has closed. A film closes by entire edges of the outline, so the error is of first order in their length:
@@ -175,11 +175,12 @@ END = 76
 CLOSING = ("base", f'growth.end="{END + 2} h"', rows_at(*range(2, 72), *np.arange(72.0, END, 0.5), END))
 
 
-@claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply, and the conductivity "
-       "falls sharply: under constant head too", fine=PAIRED, beside=BESIDE_PAIRS, date="2026-11-29 23:11")
+@claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply: under constant head",
+       fine=PAIRED, beside=BESIDE_PAIRS, date="2026-11-30 10:45")
 def throttled() -> Finding:
     """Base to 76 h: flow, uptake and growth at the end over their first or largest values; decay of active biomass over
-    its synthesis; and the fall of the conductivity with the biomass up to contact, as in C16."""
+    its synthesis. The fall of the conductivity with the biomass up to contact is a number without a verdict here: C16
+    judges "sharply"."""
     rows, last = series(*CLOSING), bodies(CLOSING)[-1]
     velocity, uptake = rows["mean_velocity_m_per_d"], consumed(rows)
     film, closed = around_contact(*CLOSING)["mean_velocity_m_per_d"]

@@ -149,7 +149,8 @@ def meaning_text(meaning: dict) -> str:
 
 def flips(checks: list[dict]) -> list[dict]:
     """The thresholds of the worded bounds of recorded checks: the checks with the same words and origin, bound on the
-    same side, hold together with bounds from ``holds`` on, and one of them fails with bounds beyond ``fails``."""
+    same side, hold together with bounds from ``holds`` on, and one of them fails with bounds beyond ``fails``. Numbers
+    that are round-off have no threshold."""
     found = []
     groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
     for check in checks:
@@ -158,6 +159,8 @@ def flips(checks: list[dict]) -> list[dict]:
     for (words, side, _), bars in groups.items():
         lows, highs = zip(*bars)
         least = {"at most": (max(highs), max(lows)), "at least": (min(lows), min(highs))}[side]
+        if max(map(abs, least)) < ROUND_OFF:
+            continue
         found.append({"words": words, "bound": side, "holds": _finite(least[0]), "fails": _finite(least[1])})
     return found
 

@@ -1,4 +1,4 @@
-"""Does the preset ``sketch``, with which `repro check` looks at a scene, judge the pores of the family as ``fast`` does?
+"""Does the preset ``sketch``, with which `repro check` looks at a scene, judge pores as ``fast`` does?
 
     python -m verification.problems.looks 17 18     # these members; all of them without numbers
 
