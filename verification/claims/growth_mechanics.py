@@ -84,13 +84,15 @@ def stabilised() -> Finding:
     Orders are slopes of a least-squares line over the package's own unrelated meshes, h = (area / nodes)^(1/2). The
     stability number is the least eigenvalue of B K^-1 B^T + C against the pressure's mass, on regular meshes: the
     weight of the pressure that the scheme controls least. Without the stabilisation C = 0; with the sign of (27), -C.
-    The order without the stabilisation is that on the package's own meshes, which have no regular pattern.
+    The order without the stabilisation is that on the three finest of the package's own meshes, which have no regular
+    pattern; on coarser ones its linear system may be singular to round-off.
     """
     bodies = [half_disc(refinement) for refinement in REFINEMENTS]
     regular = [regular_half_disc(parts) for parts in REGULAR]
     errors = np.array([growth_errors(body) for body in bodies])
     outline, pressure = (order(bodies, column) for column in errors.T)
-    pure = order(bodies, [growth_errors(body, 0.0)[1] for body in bodies])
+    finest = bodies[-3:]
+    pure = order(finest, [growth_errors(body, 0.0)[1] for body in finest])
     with_term, without_term, as_printed = ([stability(body, factor) for body in regular]
                                            for factor in (1.0, 0.0, -1.0))
     checks = (at_least("order of the outline", "convergent", outline, 1.7, "2 in theory; 1.7 for unrelated meshes"),
