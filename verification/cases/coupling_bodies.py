@@ -169,6 +169,10 @@ def test_meeting(preset, record):
     record(at_most("film", abs(film / 6 - 1), 2e-4, "an end is located if its margin is at most 1e-4; twice that"))
 
 
+#: Aims for two facing seeds of 7.07 um in the pore of Base at 2.9 m/day, written before they were measured: the mesh at
+#: 27 h has at most three times the nodes of the last mesh before the weld, and conductivity and areas differ by at most
+#: the tolerance of `fast` from those of a run that keeps all edges of the weld.
+MOST_NODES, UNCHANGED = 3.0, 3e-3
 #: Largest relative differences that the issue asks for until a quarter of the pore's length is welded.
 WELD_AIMS = {"fast": 1e-2}
 #: Length of that pore (um), and times (h) of its rows: the weld begins at 0.16 h and is as long as a quarter at 2.8 h.
