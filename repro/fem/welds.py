@@ -133,11 +133,80 @@ def _shortest(lengths: np.ndarray) -> np.ndarray:
     return np.minimum(edges[:-1], edges[1:])
 
 
+def _are_welded(outlines: Sequence[Outline]) -> bool:
+    return len(outlines) == 2 and all((outline.wall == WELD).any() for outline in outlines)
+
+
 def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """The same curves with opposite corners beyond a weld, and short edges at its ends."""
-    if len(outlines) != 2 or not all((outline.wall == WELD).any() for outline in outlines):
+    if not _are_welded(outlines):
         return list(outlines)
     return _with_opposite(_refined(outlines, sizing), sizing.film)
+
+
+def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The outlines of welded aggregates with fewer corners along the weld.
+
+    A corner leaves if the edge without it needs no split. Element sizes grow from the lines to the
+    size of an interface. Corners of the shapes at t = 0 stay. The middle of a longer arc is a point
+    of the weld.
+    """
+    if not _are_welded(outlines):
+        return list(outlines)
+    walks = _along_weld(*outlines)
+    lengths = lengths_from(outlines[0], walks[0])
+    from_line = np.minimum(lengths, lengths[-1] - lengths)
+    corners = [walk[::2] // 2 for walk in walks]
+    sizes = np.min([_line_size(sizing) + sizes_of.GRADATION * from_line,
+                    *(sizes_of.interface_sizes(outline.corners, sizing)[at]
+                      for outline, at in zip(outlines, corners))], axis=0)
+    sharp = np.any([outline.corners_at_start[at] for outline, at in zip(outlines, corners)], axis=0)
+    kept = _kept(lengths, sizes, sharp)
+    if len(kept) >= len(lengths):
+        return list(outlines)
+    first, second = (_merged(*each, kept) for each in zip(outlines, walks))
+    walks = _along_weld(first, second)
+    points = second.points.copy()
+    points[walks[1]] = first.points[walks[0]]
+    return [first, replace(second, points=points)]
+
+
+def _along_weld(first: Outline, second: Outline) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) nodes of the weld in either outline, in the order of the first one's loop."""
+    start, end = ends_of(first)
+    _, last = ends_of(second)
+    steps = np.arange((end - start) % len(first.points) + 1)
+    return (start + steps) % len(first.points), (last - steps) % len(second.points)
+
+
+def _kept(lengths: np.ndarray, sizes: np.ndarray, sharp: np.ndarray) -> list[int]:
+    """Numbers of the corners of a weld that stay.
+
+    lengths: (c,) um, arc lengths of the corners from the first one; sizes: (c,) um; sharp: (c,)
+    True where a corner must stay.
+    """
+    kept = [0]
+    for number in range(1, len(lengths) - 1):
+        size = 0.5 * (sizes[kept[-1]] + sizes[number + 1])
+        edge = lengths[number + 1] - lengths[kept[-1]]
+        if sharp[number] or edge > sizes_of.SPLIT * size:
+            kept.append(number)
+    return [*kept, len(lengths) - 1]
+
+
+def _merged(outline: Outline, walk: np.ndarray, kept: Sequence[int]) -> Outline:
+    """The outline with those corners of the consecutive nodes ``walk`` that have the numbers
+    ``kept``."""
+    lengths = lengths_from(outline, walk)
+    edge, half = np.divmod(np.arange(len(outline.points)), 2)
+    t = half / 2
+    stays = np.ones(len(edge), bool)
+    for first, last in zip(kept, kept[1:]):
+        if last > first + 1:
+            middle, *others = walk[2 * first + 1: 2 * last]
+            stays[others] = False
+            (edge[middle], t[middle]), = _places(outline, walk, lengths[[first, last]].mean(keepdims=True))
+    return placed(outline, edge[stays], t[stays])
 
 
 def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
@@ -157,20 +226,24 @@ def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
 def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """The same curves with the edges beyond a weld divided into equal parts.
 
-    Up to the length of the least film from the line, parts are at most ``sizing.moving_lines`` long
-    (or FINEST times the least film, if larger). From there on they grow.
+    Up to the length of the least film from the line, parts are at most as long as
+    :func:`_line_size`. From there on they grow.
     """
     cuts: tuple[list, list] = ([], [])
-    line = max(sizing.moving_lines, FINEST * sizing.film)
     for walks in notches(*outlines):
         for outline, walk, cut_at in zip(outlines, walks, cuts):
             lengths = lengths_from(outline, walk)
             beyond = np.maximum(lengths[:-1] - sizing.film, 0.0)
-            size = line + sizes_of.GRADATION * beyond
-            parts = np.maximum(1, np.ceil(np.diff(lengths) / size)).astype(int)
+            size = _line_size(sizing) + sizes_of.GRADATION * beyond
+            parts = np.maximum(1, np.ceil(np.diff(lengths) / (sizes_of.SPLIT * size))).astype(int)
             for start, end, count in zip(lengths, lengths[1:], parts):
                 cut_at.extend(_places(outline, walk, np.linspace(start, end, count + 1)[1:-1]))
     return [cut(outline, places) for outline, places in zip(outlines, cuts)]
+
+
+def _line_size(sizing: Sizing) -> float:
+    """Size (um) of the elements beside the ends of a weld."""
+    return max(sizing.moving_lines, FINEST * sizing.film)
 
 
 def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
