@@ -76,8 +76,8 @@ class Notch:
     positions in the old shape; size: number of nodes from corner to corner; film: least film (um);
     slope: tangent of the least angle; joined: number of pairs of corners beyond the old line that
     have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
-    thin; first_enough: smallest number for which no film is too thin; step: number of further pairs
-    in the next trial.
+    thin; first_enough: smallest number for which no film is too thin; step: largest number by which
+    the next trial has fewer pairs.
     """
 
     pairs: np.ndarray
@@ -97,33 +97,44 @@ class Notch:
         """(k, 2) pairs that have joined."""
         return self.pairs[: self.size * self.joined + 1]
 
+    @property
+    def _last(self) -> int:
+        """The largest number of pairs that may join."""
+        return (len(self.pairs) - 1) // self.size - 1
+
     def advance(self, points: np.ndarray) -> None:
         """Go to the next trial; points: (N, 2) um, of the mesh in the present trial.
 
-        The search doubles its steps until no film is too thin. Then it halves the interval. Raises
-        GrowthError if there are no further pairs.
+        While a film is too thin, all pairs up to it join. Then fewer pairs join, until the smallest
+        number without a thin film is known. Raises GrowthError if there are no further pairs.
         """
-        if not self._too_thin(points):
+        if not self._too_thin(points, self.joined):
             self.first_enough = self.joined
         else:
             self.last_too_few = self.joined
             if self.first_enough <= self.joined:  # the other notch has moved since
                 self.first_enough, self.step = inf, 1
         if self.first_enough < inf:
-            self.joined = int(self.last_too_few + self.first_enough + 1) // 2
-            return
-        last = (len(self.pairs) - 1) // self.size - 1
-        if self.last_too_few >= last:
+            middle = int(self.last_too_few + self.first_enough + 1) // 2
+            self.joined = max(middle, int(self.first_enough) - self.step)
+            self.step *= 2
+        elif self.last_too_few < self._last:
+            self.joined += 1
+            self.predict(points)
+        else:
             raise GrowthError("the weld advances beyond the nodes that are opposite each other")
-        self.joined = min(self.last_too_few + self.step, last)
-        self.step *= 2
 
-    def _too_thin(self, points: np.ndarray) -> bool:
+    def predict(self, points: np.ndarray) -> None:
+        """Join pairs until no film is too thin in a given shape; points: (N, 2) um, of its mesh."""
+        while self.joined < self._last and self._too_thin(points, self.joined):
+            self.joined += 1
+
+    def _too_thin(self, points: np.ndarray, joined: int) -> bool:
         """Is a film thinner than the rule requires? Close to the line the rule requires less, as in
         :mod:`repro.model.contact_lines`."""
-        free = self.pairs[self.size * self.joined:]
+        free = self.pairs[self.size * joined:]
         one, two = _along_arcs(points[free])
-        before = _along_arcs(self.before[self.size * self.joined:])
+        before = _along_arcs(self.before[self.size * joined:])
         along = np.cumsum(np.linalg.norm(np.diff(0.5 * (one + two), axis=0), axis=1))
         tangent = np.gradient(before.mean(axis=0), axis=0)
         normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
@@ -222,6 +233,9 @@ class Welding:
         """
         shape = replace(self.grown, space=self.start.space, pressure=self.start.pressure)
         tied = np.empty((0, 2), int) if self.reach else self._tied()
+        if not self.reach:
+            for notch in self._notches:
+                notch.predict(shape.mesh.points)
         for _ in range(CONTACT_ROUNDS):
             shape = self._joined(shape, tied)
             tied = self._tied()
