@@ -145,30 +145,48 @@ def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
 
 
 def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
-    """The outlines of welded aggregates with fewer corners along the weld.
+    """The outlines of welded aggregates with fewer corners along the weld and beyond its ends.
 
-    A corner leaves if the edge without it needs no split. Element sizes grow from the lines to the
-    size of an interface. Corners of the shapes at t = 0 stay. The middle of a longer arc is a point
-    of the weld.
+    A corner leaves if the edge without it needs no split, or if it is too close to another one.
+    Opposite corners leave together. Element sizes grow from the lines to the size of an interface.
+    Corners of the shapes at t = 0 stay. The middle of a longer arc is a point of the curve.
     """
     if not _are_welded(outlines):
         return list(outlines)
+    outlines = matched(outlines, sizing)
+    for place in range(2):
+        walks = notches(*outlines)[place]
+        lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
+        reach = _reach(outlines, walks, lengths, MATCHED_FILMS * sizing.film)
+        count = min(opposite_corners(*lengths), np.count_nonzero(lengths[0] <= reach))
+        outlines = _without_small_edges(outlines, [walk[: 2 * count - 1] for walk in walks],
+                                        np.maximum(lengths[0][:count] - sizing.film, 0.0), sizing)
     walks = _along_weld(*outlines)
     lengths = lengths_from(outlines[0], walks[0])
-    from_line = np.minimum(lengths, lengths[-1] - lengths)
-    corners = [walk[::2] // 2 for walk in walks]
-    sizes = np.min([_line_size(sizing) + sizes_of.GRADATION * from_line,
-                    *(sizes_of.interface_sizes(outline.corners, sizing)[at]
-                      for outline, at in zip(outlines, corners))], axis=0)
-    sharp = np.any([outline.corners_at_start[at] for outline, at in zip(outlines, corners)], axis=0)
-    kept = _kept(lengths, sizes, sharp)
-    if len(kept) >= len(lengths):
-        return list(outlines)
-    first, second = (_merged(*each, kept) for each in zip(outlines, walks))
+    first, second = _without_small_edges(outlines, walks,
+                                         np.minimum(lengths, lengths[-1] - lengths), sizing)
     walks = _along_weld(first, second)
     points = second.points.copy()
-    points[walks[1]] = first.points[walks[0]]
+    if len(walks[0]) > 1:
+        points[walks[1]] = first.points[walks[0]]
     return [first, replace(second, points=points)]
+
+
+def _without_small_edges(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
+                         from_line: np.ndarray, sizing: Sizing) -> list[Outline]:
+    """The outlines without small edges along ``walks``, nodes of opposite corners and middles.
+
+    from_line: (c,) um, distances of these corners from the line.
+    """
+    if len(from_line) < 3:
+        return list(outlines)
+    corners = [walk[::2] // 2 for walk in walks]
+    sizes = np.min([_line_size(sizing) + sizes_of.GRADATION * from_line,
+                    *(sizes_of.interface_sizes(outline.corners, beside)[at] for at, (outline, beside)
+                      in zip(corners, sizes_of.each_beside(outlines, sizing)))], axis=0)
+    sharp = np.any([outline.corners_at_start[at] for outline, at in zip(outlines, corners)], axis=0)
+    kept = _kept(lengths_from(outlines[0], walks[0]), sizes, sharp)
+    return [_merged(*each, kept) for each in zip(outlines, walks)]
 
 
 def _along_weld(first: Outline, second: Outline) -> tuple[np.ndarray, np.ndarray]:
@@ -188,8 +206,9 @@ def _kept(lengths: np.ndarray, sizes: np.ndarray, sharp: np.ndarray) -> list[int
     kept = [0]
     for number in range(1, len(lengths) - 1):
         size = 0.5 * (sizes[kept[-1]] + sizes[number + 1])
-        edge = lengths[number + 1] - lengths[kept[-1]]
-        if sharp[number] or edge > sizes_of.SPLIT * size:
+        before, edge = lengths[[number, number + 1]] - lengths[kept[-1]]
+        small = edge <= sizes_of.SPLIT * size or before < OPPOSITE * size
+        if sharp[number] or not small:
             kept.append(number)
     return [*kept, len(lengths) - 1]
 
@@ -233,8 +252,9 @@ def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     for walks in notches(*outlines):
         for outline, walk, cut_at in zip(outlines, walks, cuts):
             lengths = lengths_from(outline, walk)
-            beyond = np.maximum(lengths[:-1] - sizing.film, 0.0)
-            size = _line_size(sizing) + sizes_of.GRADATION * beyond
+            beyond = np.maximum(lengths - sizing.film, 0.0)
+            sizes = _line_size(sizing) + sizes_of.GRADATION * beyond
+            size = 0.5 * (sizes[:-1] + sizes[1:])
             parts = np.maximum(1, np.ceil(np.diff(lengths) / (sizes_of.SPLIT * size))).astype(int)
             for start, end, count in zip(lengths, lengths[1:], parts):
                 cut_at.extend(_places(outline, walk, np.linspace(start, end, count + 1)[1:-1]))
