@@ -150,8 +150,9 @@ def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     A corner leaves if the edge without it needs no split, or if it is too close to another one.
     Opposite corners leave together. Element sizes grow from the lines to the size of an interface.
     Corners of the shapes at t = 0 stay. The middle of a longer arc is a point of the curve.
+    Outlines that have just met have a weld of one node, and stay unchanged.
     """
-    if not _are_welded(outlines):
+    if not _are_welded(outlines) or np.count_nonzero(outlines[0].wall == WELD) == 1:
         return list(outlines)
     outlines = matched(outlines, sizing)
     for place in range(2):
@@ -167,8 +168,7 @@ def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
                                          np.minimum(lengths, lengths[-1] - lengths), sizing)
     walks = _along_weld(first, second)
     points = second.points.copy()
-    if len(walks[0]) > 1:
-        points[walks[1]] = first.points[walks[0]]
+    points[walks[1]] = first.points[walks[0]]
     return [first, replace(second, points=points)]
 
 

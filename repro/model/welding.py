@@ -22,12 +22,14 @@ import numpy as np
 
 from repro.errors import GrowthError, LinearError
 from repro.fem import welds
+from repro.fem.division import Division
 from repro.fem.forms import Basis, basis
 from repro.fem.mesh import Mesh
 from repro.fem.walls import FREE, WELD
 from repro.model import growth, remeshing
+from repro.model.closing_by_lines import divided
 from repro.model.closing_by_nodes import closing_nodes
-from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF
+from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF, Contact
 from repro.model.mechanics import (
     CONTACT_ROUNDS,
     Expansion,
@@ -40,6 +42,9 @@ from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
 from repro.model.solid import Shape, Solid
 from repro.model.support import Support
+
+#: Halvings of the arcs in which a weld ends. An end then errs by at most a sixteenth of an arc.
+ARC_HALVINGS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +113,7 @@ class Notch:
         While a film is too thin, all pairs up to it join. Then fewer pairs join, until the smallest
         number without a thin film is known. Raises GrowthError if there are no further pairs.
         """
-        if not self._too_thin(points, self.joined):
+        if not self.too_thin(points, self.joined):
             self.first_enough = self.joined
         else:
             self.last_too_few = self.joined
@@ -126,10 +131,10 @@ class Notch:
 
     def predict(self, points: np.ndarray) -> None:
         """Join pairs until no film is too thin in a given shape; points: (N, 2) um, of its mesh."""
-        while self.joined < self._last and self._too_thin(points, self.joined):
+        while self.joined < self._last and self.too_thin(points, self.joined):
             self.joined += 1
 
-    def _too_thin(self, points: np.ndarray, joined: int) -> bool:
+    def too_thin(self, points: np.ndarray, joined: int) -> bool:
         """Is a film thinner than the rule requires? Close to the line the rule requires less, as in
         :mod:`repro.model.contact_lines`."""
         free = self.pairs[self.size * joined:]
@@ -239,17 +244,97 @@ class Welding:
         for _ in range(CONTACT_ROUNDS):
             shape = self._joined(shape, tied)
             tied = self._tied()
-            marked = self._marked(shape)
             for notch in self._notches:
                 notch.advance(shape.mesh.points)
             walls = [self._closing(shape, number) for number in range(2)]
             at_rest = np.array_equal(self._tied(), tied)
             if at_rest and not any((wall != FREE).any() for wall in walls):
-                return Expansion(marked, self._iterations)
+                return self._within_arcs(shape)
             shape = replace(shape, bodies=tuple(
                 replace(body, wall=np.where(wall != FREE, wall, body.wall))
                 for wall, body in zip(walls, shape.bodies)))
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
+
+    def _within_arcs(self, shape: Pore) -> Expansion:
+        """The shape with each end of the weld within the last arcs that have joined.
+
+        shape: the equilibrium with these arcs. It is the result if there is no equilibrium with a
+        shorter weld, or if its films are too thin.
+        """
+        entire = Expansion(self._marked(shape), self._iterations)
+        inside = [k for k, notch in enumerate(self._notches) if notch.joined and not self.reach]
+        if not inside:
+            return entire
+        too_short = np.zeros(len(inside))
+        enough = np.ones(len(inside))
+        with suppress(GrowthError, LinearError):
+            for _ in range(ARC_HALVINGS):
+                t = 0.5 * (too_short + enough)
+                thin, _ = self._ending_at(shape, inside, t)
+                too_short = np.where(thin, t, too_short)
+                enough = np.where(thin, enough, t)
+            shorter = [k for k, t in zip(inside, enough) if t < 1]
+            if shorter:
+                thin, expansion = self._ending_at(shape, shorter, enough[enough < 1])
+                if not thin.any():
+                    return expansion
+        return replace(entire, iterations=self._iterations)
+
+    def _ending_at(self, shape: Pore, inside: Sequence[int],
+                   t: np.ndarray) -> tuple[np.ndarray, Expansion]:
+        """For each notch, is a film too thin if the weld ends within its last arcs?
+
+        Also returns the equilibrium. Arguments are those of :meth:`_divided`.
+        """
+        trial, start, divisions = self._divided(shape, inside, t)
+        rest = trial._equilibrium(start, trial._tied())
+        self._iterations += trial._iterations
+        notches = [trial._notches[k] for k in inside]
+        thin = np.array([notch.too_thin(rest.mesh.points, notch.joined) for notch in notches])
+        return thin, Expansion(trial._marked(rest), self._iterations, divisions=divisions)
+
+    def _divided(self, shape: Pore, inside: Sequence[int],
+                 t: np.ndarray) -> tuple[Welding, Pore, tuple[Division, ...]]:
+        """The closing on a mesh with the last arcs of notches divided, and the shape on this mesh.
+
+        inside: indices of the notches; t: where their arcs are divided, from the line to the free
+        surface.
+        """
+        grown = replace(self.grown, bodies=tuple(
+            replace(body, wall=rest.wall, fixed=rest.fixed)
+            for body, rest in zip(self.grown.bodies, shape.bodies)))
+        points = shape.mesh.points
+        pressure = shape.pressure
+        divisions = []
+        for number in range(2):
+            arcs, at = zip(*[self._last_arc(k, number, part) for k, part in zip(inside, t)])
+            order = np.argsort(arcs)
+            division = Division(grown.mesh, np.array(arcs)[order], np.array(at)[order], number)
+            free = np.full(len(arcs), FREE)
+            contact = Contact(grown.bodies[number].wall, division.arcs, division.t, free, free)
+            grown = divided(grown.focused(number), division, contact).focused(None)
+            points = division.nodal(points)
+            pressure = division.at_corners(pressure)
+            divisions.append(division)
+        start = replace(grown.moved(points), pressure=pressure)
+        trial = replace(self, grown=grown, start=start)
+        for k, notch in enumerate(self._notches):
+            nodes = len(notch.pairs) + notch.size * (k in inside)
+            walks = welds.notches(*grown.outlines)[k]
+            pairs = np.column_stack([loop[walk[:nodes]] for loop, walk
+                                     in zip(grown.mesh.topology.loops, walks)])
+            trial._notches[k] = replace(notch, pairs=pairs, before=grown.mesh.points[pairs])
+        return trial, start, tuple(divisions)
+
+    def _last_arc(self, k: int, number: int, t: float) -> tuple[int, float]:
+        """The last joined arc of a notch on one outline, and the place along the loop that is
+        ``t`` along the arc from the line."""
+        middle = self._notches[k].pairs[2 * self._notches[k].joined - 1, number]
+        loop = self.grown.mesh.topology.loops[number]
+        node = int(np.flatnonzero(loop == middle)[0])
+        forward = loop[(node + 1) % len(loop)] == self._notches[k].pairs[
+            2 * self._notches[k].joined, number]
+        return node // 2, t if forward else 1 - t
 
     def _tied(self) -> np.ndarray:
         """(k, 2) nodes of all pairs that have joined."""
