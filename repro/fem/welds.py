@@ -17,7 +17,7 @@ import numpy as np
 
 from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
-from repro.fem.outline import ON_ARC, Outline, parabola
+from repro.fem.outline import ON_ARC, Outline, area_beside_chord, parabola
 from repro.fem.sizing import Sizing, placed
 from repro.fem.walls import FREE, WELD
 
@@ -215,17 +215,29 @@ def _kept(lengths: np.ndarray, sizes: np.ndarray, sharp: np.ndarray) -> list[int
 
 def _merged(outline: Outline, walk: np.ndarray, kept: Sequence[int]) -> Outline:
     """The outline with those corners of the consecutive nodes ``walk`` that have the numbers
-    ``kept``."""
+    ``kept``. A longer arc has the area of the arcs that it replaces."""
     lengths = lengths_from(outline, walk)
     edge, half = np.divmod(np.arange(len(outline.points)), 2)
     t = half / 2
     stays = np.ones(len(edge), bool)
+    longer = {}
     for first, last in zip(kept, kept[1:]):
         if last > first + 1:
+            old = outline.points[walk[2 * first: 2 * last + 1]]
             middle, *others = walk[2 * first + 1: 2 * last]
             stays[others] = False
-            (edge[middle], t[middle]), = _places(outline, walk, lengths[[first, last]].mean(keepdims=True))
-    return placed(outline, edge[stays], t[stays])
+            half_way = lengths[[first, last]].mean(keepdims=True)
+            (edge[middle], t[middle]), = _places(outline, walk, half_way)
+            longer[middle] = old
+    merged = placed(outline, edge[stays], t[stays])
+    points = merged.points.copy()
+    for middle, old in longer.items():
+        new = np.count_nonzero(stays[:middle])
+        chord = old[-1] - old[0]
+        arc = np.array([old[0], points[new], old[-1]])
+        missing = (area_beside_chord(old) - area_beside_chord(arc)) / (chord @ chord)
+        points[new] += 1.5 * missing * np.array([chord[1], -chord[0]])
+    return replace(merged, points=points)
 
 
 def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:

@@ -422,11 +422,14 @@ class Welding:
 
     def _closing(self, shape: Pore, number: int) -> np.ndarray:
         """(M,) wall that each node of an aggregate must join next, or FREE; only entire arcs join.
+
+        A film at a wall without contact stays open, because it ends the run.
         """
         seen = shape.focused(number)
         outline = seen.boundary
         keys = self.mechanics.keys
-        wall = closing_nodes(outline, seen.walls, keys.minimum_film, keys.minimum_contact_angle)
+        touched = [wall for wall in seen.walls if (outline.wall == wall.number).any()]
+        wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle)
         if outline.geometry == 2:
             middles = wall[1::2]
             before = np.where(middles != FREE, middles, wall[::2])
