@@ -159,16 +159,15 @@ def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
         walks = notches(*outlines)[place]
         lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
         reach = _reach(outlines, walks, lengths, MATCHED_FILMS * sizing.film)
-        count = min(opposite_corners(*lengths), np.count_nonzero(lengths[0] <= reach))
+        count = min(opposite_corners(*lengths), int(np.count_nonzero(lengths[0] <= reach)))
         outlines = _without_small_edges(outlines, [walk[: 2 * count - 1] for walk in walks],
                                         np.maximum(lengths[0][:count] - sizing.film, 0.0), sizing)
-    walks = _along_weld(*outlines)
-    lengths = lengths_from(outlines[0], walks[0])
-    first, second = _without_small_edges(outlines, walks,
-                                         np.minimum(lengths, lengths[-1] - lengths), sizing)
-    walks = _along_weld(first, second)
+    along = _along_weld(*outlines)
+    s = lengths_from(outlines[0], along[0])
+    first, second = _without_small_edges(outlines, along, np.minimum(s, s[-1] - s), sizing)
+    on_first, on_second = _along_weld(first, second)
     points = second.points.copy()
-    points[walks[1]] = first.points[walks[0]]
+    points[on_second] = first.points[on_first]
     return [first, replace(second, points=points)]
 
 
@@ -181,9 +180,9 @@ def _without_small_edges(outlines: Sequence[Outline], walks: Sequence[np.ndarray
     if len(from_line) < 3:
         return list(outlines)
     corners = [walk[::2] // 2 for walk in walks]
-    sizes = np.min([_line_size(sizing) + sizes_of.GRADATION * from_line,
-                    *(sizes_of.interface_sizes(outline.corners, beside)[at] for at, (outline, beside)
-                      in zip(corners, sizes_of.each_beside(outlines, sizing)))], axis=0)
+    own = [sizes_of.interface_sizes(outline.corners, beside)[at]
+           for at, (outline, beside) in zip(corners, sizes_of.each_beside(outlines, sizing))]
+    sizes = np.min([_line_size(sizing) + sizes_of.GRADATION * from_line, *own], axis=0)
     sharp = np.any([outline.corners_at_start[at] for outline, at in zip(outlines, corners)], axis=0)
     kept = _kept(lengths_from(outlines[0], walks[0]), sizes, sharp)
     return [_merged(*each, kept) for each in zip(outlines, walks)]

@@ -365,7 +365,8 @@ class Welding:
         grown = self.grown
         mesh = grown.mesh
         union = Union.of(mesh, tied)
-        prescribed, target = self._prescribed(shape)
+        seen = [shape.focused(number) for number in range(2)]
+        prescribed, target = self._prescribed(seen)
         if placed is not None:
             prescribed[placed] = True
             target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
@@ -374,7 +375,7 @@ class Welding:
         rest = growth.equilibrium(
             self._solid(union), mesh.by_triangle([body.strained[1] for body in grown.bodies]),
             shape.mesh.points[nodes], shape.pressure[nodes[: union.corners]], prescribed[nodes],
-            target[nodes], forces=forces, supports=self._supports(shape, union),
+            target[nodes], forces=forces, supports=self._supports(seen, union),
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
         points = shape.mesh.points.copy()
@@ -398,26 +399,26 @@ class Welding:
         return WeldedSolid(shape, reference[union.nodes], energy=self.grown.bodies[0].solid.energy,
                            in_triangles=mesh.by_triangle(in_triangles))
 
-    def _prescribed(self, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
+    def _prescribed(self, seen: Sequence[Pore]) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) True where a coordinate of a node is prescribed, and (N, 2) um, positions of the
-        nodes with these coordinates."""
+        nodes with these coordinates; seen: the shape with its focus on each aggregate."""
         mesh = self.grown.mesh
         prescribed = np.zeros((len(mesh.points), 2), bool)
-        target = shape.mesh.points.copy()
-        for number, region in enumerate(mesh.regions):
-            locked, places = constraints(self.grown.focused(number), shape.focused(number))
+        target = seen[0].mesh.points.copy()
+        for number, (region, shape) in enumerate(zip(mesh.regions, seen)):
+            locked, places = constraints(self.grown.focused(number), shape)
             prescribed[region.nodes] |= locked
             target[region.nodes] = np.where(locked, places, target[region.nodes])
         return prescribed, target
 
-    def _supports(self, shape: Pore, union: Union) -> list[Support]:
-        """The supports of all contact surfaces."""
+    def _supports(self, seen: Sequence[Pore], union: Union) -> list[Support]:
+        """The supports of all contact surfaces; seen: as for :meth:`_prescribed`."""
         supports = []
-        for number, region in enumerate(self.grown.mesh.regions):
-            solid, _ = self.grown.bodies[number].strained
+        for region, body, shape in zip(self.grown.mesh.regions, self.grown.bodies, seen):
+            solid, _ = body.strained
             supports += [Support(int(union.number[region.nodes[support.point]]),
                                  union.summed(region.nodes, support.load))
-                         for support in surface_supports(solid, shape.focused(number))]
+                         for support in surface_supports(solid, shape)]
         return supports
 
     def _closing(self, shape: Pore, number: int) -> np.ndarray:
@@ -428,7 +429,7 @@ class Welding:
         seen = shape.focused(number)
         outline = seen.boundary
         keys = self.mechanics.keys
-        touched = [wall for wall in seen.walls if (outline.wall == wall.number).any()]
+        touched = tuple(wall for wall in seen.walls if (outline.wall == wall.number).any())
         wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle)
         if outline.geometry == 2:
             middles = wall[1::2]
