@@ -6,7 +6,8 @@ Each end is an event with a margin: zero at the event and positive after it.
     tearing       largest tensile stress / growth.tensile_strength - 1
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
-    meeting       1 - film between two aggregates / growth.minimum_film
+    meeting       1 - film between two aggregates / growth.minimum_film, or, if they are welded,
+                  between one of them and the wall of the other one
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the

@@ -6,8 +6,9 @@ aggregate, so both aggregates keep the strain that they had before. A film betwe
 the same rule as a film at a wall (2.3.3): the gap must be at least min(film, tan(angle) d), where d
 is the distance from the end of the weld along the middle line of the film. Pairs of opposite nodes
 (:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. The two nodes of a
-pair first move to the point half way between them, and then to equilibrium. Contact lines on walls
-advance by nodes too.
+pair first move to the point half way between them, and then to equilibrium. The last arcs that have
+joined are divided where the weld may end without a film that is too thin. Contact lines on walls
+advance by nodes.
 """
 
 from __future__ import annotations

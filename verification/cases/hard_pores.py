@@ -70,8 +70,8 @@ def test_sibling(number, record):
 #: A cheap pair that welds, in ``make test``.
 QUICK_PAIRS = (4,)
 PAIR = COMMON | {
-    "claim": "Practical pores with two seeds on opposite walls that weld: each reaches its end, the pore's end, a second "
-             "meeting that would enclose water, or a fold that an independent stretch from its files confirms",
+    "claim": "Practical pores with two seeds on opposite walls that weld: each reaches its end, the pore's end, a "
+             "second meeting that would enclose water, or a fold that an independent stretch from its files confirms",
     "norm": "pores that stop otherwise, or whose fold is not confirmed",
     "mutants": ("hard-fold-unfounded",), "omitted": "other presets: see coupling-weld"}
 
