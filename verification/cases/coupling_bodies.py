@@ -202,7 +202,7 @@ def test_weld_cost(record):
 #: Largest relative differences that the issue asks for until a quarter of the pore's length is welded.
 WELD_AIMS = {"fast": 1e-2, "accurate": 2e-3, "exact": 5e-4}
 #: Accepted where an aim is missed: lengths of 3.9, 6.8 and 15.5 um differ by 0.73, 0.21 and 0.33 % in `accurate`. Lines
-#: of the plane err by 0.1 to 0.3 % in this preset (``growth-gold-contact``), and the first weld does not become shorter.
+#: of the plane err by 0.1 to 0.3 % in this preset (``growth-gold-contact``), and a weld does not become shorter.
 WELD_ACCEPTED = {("accurate", "length of the weld"): 1e-2}
 #: Length of that pore (um), and times (h) of its rows: the weld begins at 0.16 h and is as long as a quarter at 2.8 h.
 SHORT, WELDED = 60.0, (0.5, 1.5, 2.8)
