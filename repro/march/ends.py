@@ -308,15 +308,21 @@ def _eroded(least: float, pore: Pore) -> Iterator[Event]:
 
 
 def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
-    """The events of all pairs of aggregates: their first meeting, and after a weld a second one at
-    a wall, which would enclose water."""
+    """The events of all pairs of aggregates."""
     least = ends.loading.growth.minimum_film
     for pair, film, (x, y) in _films(pore):
         end = Meeting(f"{pair} meet at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the "
                       f"film between them is {film:.3g} um, and it closes below "
                       f"growth.minimum_film, {least:g} um; {ends.without_weld}")
         yield Event(1 - film / least, end, joins=not ends.without_weld)
-    for body, outline in zip(pore.bodies, pore.outlines) if pore.welded else ():
+    if pore.welded:
+        yield from _enclosures(least, pore)
+
+
+def _enclosures(least: float, pore: Pore) -> Iterator[Event]:
+    """The events of welded aggregates that reach the wall of the other one, which would enclose
+    water; least: um, growth.minimum_film."""
+    for body, outline in zip(pore.bodies, pore.outlines):
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
             names = " and ".join(each.name for each in pore.bodies)

@@ -178,7 +178,7 @@ ALL_EDGES = {"conductivity": 10108.6, "area": 5347.72}
 
 
 @pytest.mark.slow
-@pytest.mark.case("coupling-weld-cost", kind="property", runs_with="fast", mutants=("weld-keeps-small-edges",),
+@pytest.mark.case("coupling-weld-cost", kind="property", runs_with="fast", mutants=("weld-slips",),
                   omitted="accurate, exact, paper: the rule for the edges is the same, or there is no weld")
 def test_weld_cost(record):
     """The mesh around two welded aggregates does not grow with their weld, and small edges of the weld leave without a
