@@ -199,8 +199,9 @@ def test_weld_cost(record):
     record(each_at_most(errors, UNCHANGED, "the tolerance of `fast`"))
 
 
-#: Largest relative differences that the issue asks for until a quarter of the pore's length is welded.
-WELD_AIMS = {"fast": 1e-2, "accurate": 2e-3, "exact": 5e-4}
+#: Largest relative differences that the issue asks for until a quarter of the pore's length is welded. It asks for
+#: 0.05 % in `exact`, which was not run.
+WELD_AIMS = {"fast": 1e-2, "accurate": 2e-3}
 #: Accepted where an aim is missed: lengths of 3.9, 6.8 and 15.5 um differ by 0.73, 0.21 and 0.33 % in `accurate`. Lines
 #: of the plane err by 0.1 to 0.3 % in this preset (``growth-gold-contact``), and a weld does not become shorter.
 WELD_ACCEPTED = {("accurate", "length of the weld"): 1e-2}
@@ -210,8 +211,9 @@ SHORT, WELDED = 60.0, (0.5, 1.5, 2.8)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-weld", kind="property", runs_with="fast accurate exact", omitted="paper: the scene is refused",
-    mutants=("weld-slips",))
+    "coupling-weld", kind="property", runs_with="fast accurate",
+    omitted="exact: minutes for each hour. paper: the scene is refused",
+    mutants=("weld-slips", "weld-ends-at-corners"))
 @parametrize("preset, bound", {preset: (preset, bound) for preset, bound in WELD_AIMS.items()})
 def test_weld(preset, bound, record):
     """Two equal aggregates on opposite walls that weld grow and clog their pore as one does that touches a plane of
