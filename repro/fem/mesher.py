@@ -67,7 +67,7 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
     crosses itself, another outline, a wall or an end of the channel, or if a curved triangle is
     turned over.
     """
-    outlines = list(outlines)
+    outlines = welds.coarsened(outlines, sizing)
     for _ in range(HALVINGS):
         outlines = [sizes_of.split(outline, beside)
                     for outline, beside in sizes_of.each_beside(outlines, sizing)]

@@ -105,13 +105,8 @@ class Outline:
 
     @cached_property
     def area(self) -> float:
-        """Area inside (um2): the area of the corners' polygon plus, for each arc, two thirds of
-        chord times height."""
-        a, m, b = np.moveaxis(self.arcs(self.points), 1, 0)
-        chord = b - a
-        bow = m - 0.5 * (a + b)
-        lens = bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]
-        return polygon_area(self.points[::self.geometry]) + float(2 / 3 * np.sum(lens))
+        """Area inside (um2): of the corners' polygon, and between the arcs and their chords."""
+        return polygon_area(self.points[::self.geometry]) + _lenses(self.arcs(self.points))
 
     @cached_property
     def corners(self) -> Outline:
@@ -191,6 +186,23 @@ def polygon_area(points: np.ndarray) -> float:
     """Signed area of a closed polygon, points (M, 2); positive counterclockwise."""
     x, y = points.T
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def area_beside_chord(points: np.ndarray) -> float:
+    """Signed area (um2) between consecutive arcs with nodes (2 k + 1, 2) um and the line between
+    their ends."""
+    arcs = np.stack([points[:-2:2], points[1:-1:2], points[2::2]], axis=1)
+    return polygon_area(points[::2]) + _lenses(arcs)
+
+
+def _lenses(arcs: np.ndarray) -> float:
+    """Signed area between arcs with nodes (k, 3, 2) and their chords: two thirds of chord times
+    height."""
+    a, m, b = np.moveaxis(arcs, 1, 0)
+    chord = b - a
+    bow = m - 0.5 * (a + b)
+    lens = bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]
+    return float(2 / 3 * np.sum(lens))
 
 
 def parabola(t: np.ndarray) -> np.ndarray:

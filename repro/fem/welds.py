@@ -17,7 +17,7 @@ import numpy as np
 
 from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
-from repro.fem.outline import ON_ARC, Outline, parabola
+from repro.fem.outline import ON_ARC, Outline, area_beside_chord, parabola
 from repro.fem.sizing import Sizing, placed
 from repro.fem.walls import FREE, WELD
 
@@ -133,11 +133,110 @@ def _shortest(lengths: np.ndarray) -> np.ndarray:
     return np.minimum(edges[:-1], edges[1:])
 
 
+def _are_welded(outlines: Sequence[Outline]) -> bool:
+    return len(outlines) == 2 and all((outline.wall == WELD).any() for outline in outlines)
+
+
 def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """The same curves with opposite corners beyond a weld, and short edges at its ends."""
-    if len(outlines) != 2 or not all((outline.wall == WELD).any() for outline in outlines):
+    if not _are_welded(outlines):
         return list(outlines)
     return _with_opposite(_refined(outlines, sizing), sizing.film)
+
+
+def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The outlines of welded aggregates with fewer corners along the weld and beyond its ends.
+
+    A corner leaves if the edge without it needs no split, or if it is too close to another one.
+    Opposite corners leave together. Element sizes grow from the lines to the size of an interface.
+    Corners of the shapes at t = 0 stay. The middle of a longer arc is a point of the curve.
+    Outlines that have just met have a weld of one node, and stay unchanged.
+    """
+    if not _are_welded(outlines) or np.count_nonzero(outlines[0].wall == WELD) == 1:
+        return list(outlines)
+    outlines = matched(outlines, sizing)
+    for place in range(2):
+        walks = notches(*outlines)[place]
+        lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
+        reach = _reach(outlines, walks, lengths, MATCHED_FILMS * sizing.film)
+        count = min(opposite_corners(*lengths), int(np.count_nonzero(lengths[0] <= reach)))
+        outlines = _without_small_edges(outlines, [walk[: 2 * count - 1] for walk in walks],
+                                        np.maximum(lengths[0][:count] - sizing.film, 0.0), sizing)
+    along = _along_weld(*outlines)
+    s = lengths_from(outlines[0], along[0])
+    first, second = _without_small_edges(outlines, along, np.minimum(s, s[-1] - s), sizing)
+    on_first, on_second = _along_weld(first, second)
+    points = second.points.copy()
+    points[on_second] = first.points[on_first]
+    return [first, replace(second, points=points)]
+
+
+def _without_small_edges(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
+                         from_line: np.ndarray, sizing: Sizing) -> list[Outline]:
+    """The outlines without small edges along ``walks``, nodes of opposite corners and middles.
+
+    from_line: (c,) um, distances of these corners from the line.
+    """
+    if len(from_line) < 3:
+        return list(outlines)
+    corners = [walk[::2] // 2 for walk in walks]
+    own = [sizes_of.interface_sizes(outline.corners, beside)[at]
+           for at, (outline, beside) in zip(corners, sizes_of.each_beside(outlines, sizing))]
+    sizes = np.min([_line_size(sizing) + sizes_of.GRADATION * from_line, *own], axis=0)
+    sharp = np.any([outline.corners_at_start[at] for outline, at in zip(outlines, corners)], axis=0)
+    kept = _kept(lengths_from(outlines[0], walks[0]), sizes, sharp)
+    return [_merged(*each, kept) for each in zip(outlines, walks)]
+
+
+def _along_weld(first: Outline, second: Outline) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) nodes of the weld in either outline, in the order of the first one's loop."""
+    start, end = ends_of(first)
+    _, last = ends_of(second)
+    steps = np.arange((end - start) % len(first.points) + 1)
+    return (start + steps) % len(first.points), (last - steps) % len(second.points)
+
+
+def _kept(lengths: np.ndarray, sizes: np.ndarray, sharp: np.ndarray) -> list[int]:
+    """Numbers of the corners of a weld that stay.
+
+    lengths: (c,) um, arc lengths of the corners from the first one; sizes: (c,) um; sharp: (c,)
+    True where a corner must stay.
+    """
+    kept = [0]
+    for number in range(1, len(lengths) - 1):
+        size = 0.5 * (sizes[kept[-1]] + sizes[number + 1])
+        before, edge = lengths[[number, number + 1]] - lengths[kept[-1]]
+        small = edge <= sizes_of.SPLIT * size or before < OPPOSITE * size
+        if sharp[number] or not small:
+            kept.append(number)
+    return [*kept, len(lengths) - 1]
+
+
+def _merged(outline: Outline, walk: np.ndarray, kept: Sequence[int]) -> Outline:
+    """The outline with those corners of the consecutive nodes ``walk`` that have the numbers
+    ``kept``. A longer arc has the area of the arcs that it replaces."""
+    lengths = lengths_from(outline, walk)
+    edge, half = np.divmod(np.arange(len(outline.points)), 2)
+    t = half / 2
+    stays = np.ones(len(edge), bool)
+    longer = {}
+    for first, last in zip(kept, kept[1:]):
+        if last > first + 1:
+            old = outline.points[walk[2 * first: 2 * last + 1]]
+            middle, *others = walk[2 * first + 1: 2 * last]
+            stays[others] = False
+            half_way = lengths[[first, last]].mean(keepdims=True)
+            (edge[middle], t[middle]), = _places(outline, walk, half_way)
+            longer[middle] = old
+    merged = placed(outline, edge[stays], t[stays])
+    points = merged.points.copy()
+    for middle, old in longer.items():
+        new = np.count_nonzero(stays[:middle])
+        chord = old[-1] - old[0]
+        arc = np.array([old[0], points[new], old[-1]])
+        missing = (area_beside_chord(old) - area_beside_chord(arc)) / (chord @ chord)
+        points[new] += 1.5 * missing * np.array([chord[1], -chord[0]])
+    return replace(merged, points=points)
 
 
 def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
@@ -157,20 +256,25 @@ def _with_opposite(outlines: Sequence[Outline], film: float) -> list[Outline]:
 def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """The same curves with the edges beyond a weld divided into equal parts.
 
-    Up to the length of the least film from the line, parts are at most ``sizing.moving_lines`` long
-    (or FINEST times the least film, if larger). From there on they grow.
+    Up to the length of the least film from the line, parts are at most as long as
+    :func:`_line_size`. From there on they grow.
     """
     cuts: tuple[list, list] = ([], [])
-    line = max(sizing.moving_lines, FINEST * sizing.film)
     for walks in notches(*outlines):
         for outline, walk, cut_at in zip(outlines, walks, cuts):
             lengths = lengths_from(outline, walk)
-            beyond = np.maximum(lengths[:-1] - sizing.film, 0.0)
-            size = line + sizes_of.GRADATION * beyond
-            parts = np.maximum(1, np.ceil(np.diff(lengths) / size)).astype(int)
+            beyond = np.maximum(lengths - sizing.film, 0.0)
+            sizes = _line_size(sizing) + sizes_of.GRADATION * beyond
+            size = 0.5 * (sizes[:-1] + sizes[1:])
+            parts = np.maximum(1, np.ceil(np.diff(lengths) / (sizes_of.SPLIT * size))).astype(int)
             for start, end, count in zip(lengths, lengths[1:], parts):
                 cut_at.extend(_places(outline, walk, np.linspace(start, end, count + 1)[1:-1]))
     return [cut(outline, places) for outline, places in zip(outlines, cuts)]
+
+
+def _line_size(sizing: Sizing) -> float:
+    """Size (um) of the elements beside the ends of a weld."""
+    return max(sizing.moving_lines, FINEST * sizing.film)
 
 
 def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:

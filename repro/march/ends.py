@@ -6,7 +6,8 @@ Each end is an event with a margin: zero at the event and positive after it.
     tearing       largest tensile stress / growth.tensile_strength - 1
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
-    meeting       1 - film between two aggregates / growth.minimum_film
+    meeting       1 - film between two aggregates / growth.minimum_film, or, if they are welded,
+                  between one of them and the wall of the other one
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the
@@ -91,7 +92,8 @@ class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
 
     With ``growth.meeting = "weld"``, the default, two aggregates on opposite walls join instead,
-    and the run continues.
+    and the run continues until one of them reaches the wall of the other one. This would enclose
+    water.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the coordinates (um).
@@ -306,13 +308,29 @@ def _eroded(least: float, pore: Pore) -> Iterator[Event]:
 
 
 def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
-    """The events of all pairs of aggregates that are not welded."""
+    """The events of all pairs of aggregates."""
     least = ends.loading.growth.minimum_film
     for pair, film, (x, y) in _films(pore):
         end = Meeting(f"{pair} meet at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the "
                       f"film between them is {film:.3g} um, and it closes below "
                       f"growth.minimum_film, {least:g} um; {ends.without_weld}")
         yield Event(1 - film / least, end, joins=not ends.without_weld)
+    if pore.welded:
+        yield from _enclosures(least, pore)
+
+
+def _enclosures(least: float, pore: Pore) -> Iterator[Event]:
+    """The events of welded aggregates that reach the wall of the other one, which would enclose
+    water; least: um, growth.minimum_film."""
+    for body, outline in zip(pore.bodies, pore.outlines):
+        for wall in outline.untouched(pore.mesh.walls):
+            film, x = outline.nearest(wall)
+            names = " and ".join(each.name for each in pore.bodies)
+            end = Meeting(f"aggregates {names} meet at t = {pore.time:g} h: near x = {x:.4g} um "
+                          f"the film between aggregate {body.name} and the wall of the other one "
+                          f"is {film:.3g} um, and it closes below growth.minimum_film, {least:g} "
+                          "um; this would enclose water beside their weld")
+            yield Event(1 - film / least, end)
 
 
 def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:

@@ -333,7 +333,9 @@ def divided(grown: Pore, division: Division, contact: Contact,
     table = grown.space.table
     body = grown.body
     region = space.mesh.regions[division.number]
-    reference = division.nodal(grown.origin)[region.nodes]
+    origin = grown.mesh.points.copy()
+    origin[grown.region.nodes] = body.reference
+    reference = division.nodal(origin)[region.nodes]
     solid = (replace(body.solid, shape=shape, reference=reference) if shape
              else material(space, region, reference, body.solid.energy))
     configuration = body.configuration.carried(lambda positions: division.nodal(

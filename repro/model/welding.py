@@ -6,8 +6,9 @@ aggregate, so both aggregates keep the strain that they had before. A film betwe
 the same rule as a film at a wall (2.3.3): the gap must be at least min(film, tan(angle) d), where d
 is the distance from the end of the weld along the middle line of the film. Pairs of opposite nodes
 (:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. The two nodes of a
-pair first move to the point half way between them, and then to equilibrium. Contact lines on walls
-advance by nodes too.
+pair first move to the point half way between them, and then to equilibrium. The last arcs that have
+joined are divided where the weld may end without a film that is too thin. Contact lines on walls
+advance by nodes.
 """
 
 from __future__ import annotations
@@ -16,18 +17,20 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf
+from math import ceil, inf, log2
 
 import numpy as np
 
 from repro.errors import GrowthError, LinearError
 from repro.fem import welds
+from repro.fem.division import Division
 from repro.fem.forms import Basis, basis
 from repro.fem.mesh import Mesh
 from repro.fem.walls import FREE, WELD
 from repro.model import growth, remeshing
+from repro.model.closing_by_lines import divided
 from repro.model.closing_by_nodes import closing_nodes
-from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF
+from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF, Contact
 from repro.model.mechanics import (
     CONTACT_ROUNDS,
     Expansion,
@@ -40,6 +43,11 @@ from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
 from repro.model.solid import Shape, Solid
 from repro.model.support import Support
+
+#: Arcs in which a weld ends are halved until a part is shorter than the arc times this times
+#: numerics.tolerance: to a sixteenth in ``fast``, where lengths then err by 0.8 % or less
+#: (``coupling-weld``; up to 1.4 % with an eighth).
+ARC_PART = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +84,8 @@ class Notch:
     positions in the old shape; size: number of nodes from corner to corner; film: least film (um);
     slope: tangent of the least angle; joined: number of pairs of corners beyond the old line that
     have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
-    thin; first_enough: smallest number for which no film is too thin; step: number of further pairs
-    in the next trial.
+    thin; first_enough: smallest number for which no film is too thin; step: largest number by which
+    the next trial has fewer pairs.
     """
 
     pairs: np.ndarray
@@ -97,33 +105,44 @@ class Notch:
         """(k, 2) pairs that have joined."""
         return self.pairs[: self.size * self.joined + 1]
 
+    @property
+    def _last(self) -> int:
+        """The largest number of pairs that may join."""
+        return (len(self.pairs) - 1) // self.size - 1
+
     def advance(self, points: np.ndarray) -> None:
         """Go to the next trial; points: (N, 2) um, of the mesh in the present trial.
 
-        The search doubles its steps until no film is too thin. Then it halves the interval. Raises
-        GrowthError if there are no further pairs.
+        While a film is too thin, all pairs up to it join. Then fewer pairs join, until the smallest
+        number without a thin film is known. Raises GrowthError if there are no further pairs.
         """
-        if not self._too_thin(points):
+        if not self.too_thin(points, self.joined):
             self.first_enough = self.joined
         else:
             self.last_too_few = self.joined
             if self.first_enough <= self.joined:  # the other notch has moved since
                 self.first_enough, self.step = inf, 1
         if self.first_enough < inf:
-            self.joined = int(self.last_too_few + self.first_enough + 1) // 2
-            return
-        last = (len(self.pairs) - 1) // self.size - 1
-        if self.last_too_few >= last:
+            middle = int(self.last_too_few + self.first_enough + 1) // 2
+            self.joined = max(middle, int(self.first_enough) - self.step)
+            self.step *= 2
+        elif self.last_too_few < self._last:
+            self.joined += 1
+            self.predict(points)
+        else:
             raise GrowthError("the weld advances beyond the nodes that are opposite each other")
-        self.joined = min(self.last_too_few + self.step, last)
-        self.step *= 2
 
-    def _too_thin(self, points: np.ndarray) -> bool:
+    def predict(self, points: np.ndarray) -> None:
+        """Join pairs until no film is too thin in a given shape; points: (N, 2) um, of its mesh."""
+        while self.joined < self._last and self.too_thin(points, self.joined):
+            self.joined += 1
+
+    def too_thin(self, points: np.ndarray, joined: int) -> bool:
         """Is a film thinner than the rule requires? Close to the line the rule requires less, as in
         :mod:`repro.model.contact_lines`."""
-        free = self.pairs[self.size * self.joined:]
+        free = self.pairs[self.size * joined:]
         one, two = _along_arcs(points[free])
-        before = _along_arcs(self.before[self.size * self.joined:])
+        before = _along_arcs(self.before[self.size * joined:])
         along = np.cumsum(np.linalg.norm(np.diff(0.5 * (one + two), axis=0), axis=1))
         tangent = np.gradient(before.mean(axis=0), axis=0)
         normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
@@ -222,20 +241,103 @@ class Welding:
         """
         shape = replace(self.grown, space=self.start.space, pressure=self.start.pressure)
         tied = np.empty((0, 2), int) if self.reach else self._tied()
+        if not self.reach:
+            for notch in self._notches:
+                notch.predict(shape.mesh.points)
         for _ in range(CONTACT_ROUNDS):
             shape = self._joined(shape, tied)
             tied = self._tied()
-            marked = self._marked(shape)
             for notch in self._notches:
                 notch.advance(shape.mesh.points)
             walls = [self._closing(shape, number) for number in range(2)]
             at_rest = np.array_equal(self._tied(), tied)
             if at_rest and not any((wall != FREE).any() for wall in walls):
-                return Expansion(marked, self._iterations)
+                return self._within_arcs(shape)
             shape = replace(shape, bodies=tuple(
                 replace(body, wall=np.where(wall != FREE, wall, body.wall))
                 for wall, body in zip(walls, shape.bodies)))
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
+
+    def _within_arcs(self, shape: Pore) -> Expansion:
+        """The shape with each end of the weld within the last arcs that have joined.
+
+        shape: the equilibrium with these arcs. It is the result if there is no equilibrium with a
+        shorter weld, or if its films are too thin.
+        """
+        entire = Expansion(self._marked(shape), self._iterations)
+        inside = [k for k, notch in enumerate(self._notches) if notch.joined and not self.reach]
+        if not inside:
+            return entire
+        too_short = np.zeros(len(inside))
+        enough = np.ones(len(inside))
+        with suppress(GrowthError, LinearError):
+            for _ in range(ceil(-log2(ARC_PART * self.mechanics.numerics.tolerance))):
+                t = 0.5 * (too_short + enough)
+                thin, _ = self._ending_at(shape, inside, t)
+                too_short = np.where(thin, t, too_short)
+                enough = np.where(thin, enough, t)
+            shorter = [k for k, t in zip(inside, enough) if t < 1]
+            if shorter:
+                thin, expansion = self._ending_at(shape, shorter, enough[enough < 1])
+                if not thin.any():
+                    return expansion
+        return replace(entire, iterations=self._iterations)
+
+    def _ending_at(self, shape: Pore, inside: Sequence[int],
+                   t: np.ndarray) -> tuple[np.ndarray, Expansion]:
+        """For each notch, is a film too thin if the weld ends within its last arcs?
+
+        Also returns the equilibrium. Arguments are those of :meth:`_divided`.
+        """
+        trial, start, divisions = self._divided(shape, inside, t)
+        rest = trial._equilibrium(start, trial._tied())
+        self._iterations += trial._iterations
+        notches = [trial._notches[k] for k in inside]
+        thin = np.array([notch.too_thin(rest.mesh.points, notch.joined) for notch in notches])
+        return thin, Expansion(trial._marked(rest), self._iterations, divisions=divisions)
+
+    def _divided(self, shape: Pore, inside: Sequence[int],
+                 t: np.ndarray) -> tuple[Welding, Pore, tuple[Division, ...]]:
+        """The closing on a mesh with the last arcs of notches divided, and the shape on this mesh.
+
+        inside: indices of the notches; t: where their arcs are divided, from the line to the free
+        surface.
+        """
+        grown = replace(self.grown, bodies=tuple(
+            replace(body, wall=rest.wall, fixed=rest.fixed)
+            for body, rest in zip(self.grown.bodies, shape.bodies)))
+        points = shape.mesh.points
+        pressure = shape.pressure
+        divisions = []
+        for number in range(2):
+            arcs, at = zip(*[self._last_arc(k, number, part) for k, part in zip(inside, t)])
+            order = np.argsort(arcs)
+            division = Division(grown.mesh, np.array(arcs)[order], np.array(at)[order], number)
+            free = np.full(len(arcs), FREE)
+            contact = Contact(grown.bodies[number].wall, division.arcs, division.t, free, free)
+            grown = divided(grown.focused(number), division, contact).focused(None)
+            points = division.nodal(points)
+            pressure = division.at_corners(pressure)
+            divisions.append(division)
+        start = replace(grown.moved(points), pressure=pressure)
+        trial = replace(self, grown=grown, start=start)
+        for k, notch in enumerate(self._notches):
+            nodes = len(notch.pairs) + notch.size * (k in inside)
+            walks = welds.notches(*grown.outlines)[k]
+            pairs = np.column_stack([loop[walk[:nodes]] for loop, walk
+                                     in zip(grown.mesh.topology.loops, walks)])
+            trial._notches[k] = replace(notch, pairs=pairs, before=grown.mesh.points[pairs])
+        return trial, start, tuple(divisions)
+
+    def _last_arc(self, k: int, number: int, t: float) -> tuple[int, float]:
+        """The last joined arc of a notch on one outline, and the place along the loop that is
+        ``t`` along the arc from the line."""
+        middle = self._notches[k].pairs[2 * self._notches[k].joined - 1, number]
+        loop = self.grown.mesh.topology.loops[number]
+        node = int(np.flatnonzero(loop == middle)[0])
+        forward = loop[(node + 1) % len(loop)] == self._notches[k].pairs[
+            2 * self._notches[k].joined, number]
+        return node // 2, t if forward else 1 - t
 
     def _tied(self) -> np.ndarray:
         """(k, 2) nodes of all pairs that have joined."""
@@ -266,7 +368,8 @@ class Welding:
         grown = self.grown
         mesh = grown.mesh
         union = Union.of(mesh, tied)
-        prescribed, target = self._prescribed(shape)
+        seen = [shape.focused(number) for number in range(2)]
+        prescribed, target = self._prescribed(seen)
         if placed is not None:
             prescribed[placed] = True
             target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
@@ -275,7 +378,7 @@ class Welding:
         rest = growth.equilibrium(
             self._solid(union), mesh.by_triangle([body.strained[1] for body in grown.bodies]),
             shape.mesh.points[nodes], shape.pressure[nodes[: union.corners]], prescribed[nodes],
-            target[nodes], forces=forces, supports=self._supports(shape, union),
+            target[nodes], forces=forces, supports=self._supports(seen, union),
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
         points = shape.mesh.points.copy()
@@ -299,35 +402,38 @@ class Welding:
         return WeldedSolid(shape, reference[union.nodes], energy=self.grown.bodies[0].solid.energy,
                            in_triangles=mesh.by_triangle(in_triangles))
 
-    def _prescribed(self, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
+    def _prescribed(self, seen: Sequence[Pore]) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) True where a coordinate of a node is prescribed, and (N, 2) um, positions of the
-        nodes with these coordinates."""
+        nodes with these coordinates; seen: the shape with its focus on each aggregate."""
         mesh = self.grown.mesh
         prescribed = np.zeros((len(mesh.points), 2), bool)
-        target = shape.mesh.points.copy()
-        for number, region in enumerate(mesh.regions):
-            locked, places = constraints(self.grown.focused(number), shape.focused(number))
+        target = seen[0].mesh.points.copy()
+        for number, (region, shape) in enumerate(zip(mesh.regions, seen)):
+            locked, places = constraints(self.grown.focused(number), shape)
             prescribed[region.nodes] |= locked
             target[region.nodes] = np.where(locked, places, target[region.nodes])
         return prescribed, target
 
-    def _supports(self, shape: Pore, union: Union) -> list[Support]:
-        """The supports of all contact surfaces."""
+    def _supports(self, seen: Sequence[Pore], union: Union) -> list[Support]:
+        """The supports of all contact surfaces; seen: as for :meth:`_prescribed`."""
         supports = []
-        for number, region in enumerate(self.grown.mesh.regions):
-            solid, _ = self.grown.bodies[number].strained
+        for region, body, shape in zip(self.grown.mesh.regions, self.grown.bodies, seen):
+            solid, _ = body.strained
             supports += [Support(int(union.number[region.nodes[support.point]]),
                                  union.summed(region.nodes, support.load))
-                         for support in surface_supports(solid, shape.focused(number))]
+                         for support in surface_supports(solid, shape)]
         return supports
 
     def _closing(self, shape: Pore, number: int) -> np.ndarray:
         """(M,) wall that each node of an aggregate must join next, or FREE; only entire arcs join.
+
+        A film at a wall without contact stays open, because it ends the run.
         """
         seen = shape.focused(number)
         outline = seen.boundary
         keys = self.mechanics.keys
-        wall = closing_nodes(outline, seen.walls, keys.minimum_film, keys.minimum_contact_angle)
+        touched = tuple(wall for wall in seen.walls if (outline.wall == wall.number).any())
+        wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle)
         if outline.geometry == 2:
             middles = wall[1::2]
             before = np.where(middles != FREE, middles, wall[::2])

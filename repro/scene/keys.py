@@ -385,9 +385,9 @@ class Growth:
         about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
     meeting: str = choice(
         "weld", "end", source="Section 5, without a model",
-        about="Two aggregates that meet join and share their motion from then on, or end the run. "
-              "A weld needs two of them on opposite walls along which they slide, and curved "
-              "elements, without erosion and fluid forces; otherwise a meeting ends the run")
+        about="If two aggregates meet, they join and move together (weld), or the run ends (end). "
+              "They join only if there are exactly two, on opposite sliding walls, with curved "
+              "elements, without erosion and fluid forces. Otherwise the run ends")
     until: str = choice(
         "end", "steady",
         about="The run goes on to end, or ends early if the aggregates are steady")

@@ -65,3 +65,25 @@ def test_sibling(number, record):
     print(json.dumps(row))
     failed = row["verdict"] in (family.FAILED, family.UNCONFIRMED)
     record(at_most(f"{row['verdict']}: {row['status'][:300]}" if failed else "failures", failed, 0, "see the claim"))
+
+
+#: A cheap pair that welds, in ``make test``.
+QUICK_PAIRS = (4,)
+PAIR = COMMON | {
+    "claim": "Practical pores with two seeds on opposite walls that weld: each reaches its end, the pore's end, a "
+             "second meeting that would enclose water, or a fold that an independent stretch from its files confirms",
+    "norm": "pores that stop otherwise, or whose fold is not confirmed",
+    "mutants": ("hard-fold-unfounded",), "omitted": "other presets: see coupling-weld"}
+
+
+@pytest.mark.parametrize("number", [
+    pytest.param(number, id=f"pair {number}", marks=marks)
+    for quick, marks in ((True, (pytest.mark.case("hard-pairs", **PAIR),)),
+                         (False, (pytest.mark.case("hard-pairs-rest", **PAIR), pytest.mark.slow)))
+    for number in range(siblings.PAIRS) if (number in QUICK_PAIRS) == quick])
+def test_pair(number, record):
+    """Run a pore with two seeds that weld. A failure shows its row of the record."""
+    row = siblings.run_sibling(siblings.draw_pair(number))
+    print(json.dumps(row))
+    failed = row["verdict"] in (family.FAILED, family.UNCONFIRMED)
+    record(at_most(f"{row['verdict']}: {row['status'][:300]}" if failed else "failures", failed, 0, "see the claim"))
