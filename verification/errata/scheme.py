@@ -194,7 +194,8 @@ HALF_STEP = switches.changed('growth.time_step="6 min"')
         the constraint J = theta. At a remesh J follows from the transferred positions at t = 0.""",
     reading="""(28) as printed between remeshes. At a remesh theta restarts as J times the density over X_m, the
         expansion that returns each triangle to X_m. Errors then do not accumulate. The paper seems to restart from J
-        alone, which treats the present density as exact. The curved presets interpolate theta instead if strain counts from t = 0, because J is rough beside contact lines.""",
+        alone, which treats the present density as exact. The curved presets interpolate theta instead if strain counts
+        from t = 0, because J is rough beside contact lines.""",
     consequence="""
         Largest |X / X_m - 1|, X = X_A + X_I, of any node (wide: in whole hours):
 

@@ -178,10 +178,10 @@ def printed_effluents() -> Numbers:
 
         {table}
 
-        Our own ledger closes to round-off, so these are errors of the formula. The paper's 1.6 % is another one.
-        On a coarse mesh the scheme as printed loses as much substrate (E24), so effluents must be raised to balance. The
-        paper raises them "throughout the whole numerical simulation". The 1.6 % cannot hold throughout: until {until} h an
-        effluent raised by it exceeds the supply (the donor's for the longer time).""")
+        Our own ledger closes to round-off, so these are errors of the formula. The paper's 1.6 % is another one. On a
+        coarse mesh the scheme as printed loses as much substrate (E24), so effluents must be raised to balance. The
+        paper raises them "throughout the whole numerical simulation". The 1.6 % cannot hold throughout: until {until} h
+        an effluent raised by it exceeds the supply (the donor's for the longer time).""")
 def balance_formula() -> Numbers:
     """Ratio of the paper's dM_C to the integrals of F1 and F2, in some steps of base."""
     book, columns = bookkeeping(BASE), series(*BASE)
@@ -315,16 +315,16 @@ def doubling_time() -> Numbers:
     consequence="""
         The discrete u conserves water only on average, so substrate is lost near the aggregate. The table has base at
         19.2 h by `as_printed` with one change, u_x(y) in (11): u_ave makes an error of its own (E4). The meshes have
-        several sizes. Lost: supplied - out - consumed, in percent of the effluent, the factor by which effluents must be
-        raised to balance. Consumed ratio: acceptor over donor by the effluents (printed: 1.501).
+        several sizes. Lost: supplied - out - consumed, in percent of the effluent, the factor by which effluents must
+        be raised to balance. Consumed ratio: acceptor over donor by the effluents (printed: 1.501).
 
         {table}
 
         The loss has the sign of the paper's correction, on both substrates, and is nearest to its 1.6 % with {nodes}
-        nodes. But there velocity and effluents are {nearest}, far from the printed 1.5 m/d, 4.19 and 6.13, and no mesh of
-        the table has the printed ratio: the least one is {least}, above F = 1.52. So this loss does not explain the printed effluents
-        (E14). The paper prints no number of nodes. `as_printed` itself, with u_ave, loses {mean} with the element size of
-        the last line ({mean_nodes} nodes).""")
+        nodes. But there velocity and effluents are {nearest}, far from the printed 1.5 m/d, 4.19 and 6.13, and no mesh
+        of the table has the printed ratio: the least one is {least}, above F = 1.52. So this loss does not explain the
+        printed effluents (E14). The paper prints no number of nodes. `as_printed` itself, with u_ave, loses {mean} with
+        the element size of the last line ({mean_nodes} nodes).""")
 def carrier() -> Numbers:
     """The scheme as printed on several meshes."""
     meshes = [printed_scheme(refinement) for refinement in REFINEMENTS]

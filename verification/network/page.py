@@ -21,8 +21,8 @@ PAGE_SHARES = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (
 
 def text() -> str:
     """The page."""
-    parts = (TITLE, _limits(), DEFINITION, _values(), _fit(), _judged(), _range_of_table(), UPTAKE, _fit_of_uptake(), _judged_uptake(),
-             _example(), _own(), _throats(), _laws_apart(), _sweep())
+    parts = (TITLE, _limits(), DEFINITION, _values(), _fit(), _judged(), _range_of_table(), UPTAKE, _fit_of_uptake(),
+             _judged_uptake(), _example(), _own(), _throats(), _laws_apart(), _sweep())
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -133,8 +133,8 @@ Without `spanned` the area decides whether the aggregate touches both walls; fro
 cases. Outside the table the function raises `ValueError` with the index of the throat; with `outside="nan"` that
 throat has no result. The law holds for the paper's viscous aggregate with its own condition on the surface [E2]. With
 continuous traction NGSolve changes r of half-discs 0.88 and 0.96 W thick by {_list(discs, "+.1f")} %, and that of three
-plugs grown in Wide, of 1.6 to 3.1 W^2, by {_list(plugs, "+.1f")} %. Shorter plugs than those of the law change by more, a
-straight one of 0.25 W by -45 % [E2]."""
+plugs grown in Wide, of 1.6 to 3.1 W^2, by {_list(plugs, "+.1f")} %. Shorter plugs than those of the law change by
+more, a straight one of 0.25 W by -45 % [E2]."""
 
 
 def _fit_of_uptake() -> str:
