@@ -28,8 +28,8 @@ CLAIMS = ("C12", "C25", "C29", "C31")
 
 #: Hours between outlines.
 EVERY = 5.0
-#: Length of channel drawn on both sides of the widest outline, um.
-MARGIN = 15.0
+#: Length of channel drawn on both sides of the widest outline, and in the last panel of Figure 6, um.
+MARGIN, LAST_MARGIN = 15.0, 50.0
 #: Points of the drawn line for each edge of the outline.
 PER_EDGE = 8
 
@@ -37,13 +37,13 @@ PER_EDGE = 8
 @style.styled
 def draw(*folders: Path) -> Figure:
     """Outlines every EVERY hours with each supply, coloured by time."""
-    figure = style.figure(5.6)
-    panels = figure.subplots(len(folders), 1)
+    figure = style.figure(4.9)
+    panels = figure.subplots(len(folders), 1, height_ratios=[1, 1, 0.45])
     every = [states.every(folder, EVERY) for folder in folders]
     colours = scale(max(drawn[-1].time for drawn in every), EVERY)
-    reach = span(sum(every, []))
-    for axes, drawn, supply in zip(panels, every, SUPPLIES):
-        fill(axes, drawn, colours, reach)
+    reach = span(sum(every[:-1], []), MARGIN)
+    for axes, drawn, supply, margin in zip(panels, every, SUPPLIES, (MARGIN, MARGIN, LAST_MARGIN)):
+        fill(axes, drawn, colours, reach if margin == MARGIN else span(drawn, margin), margin)
         axes.set_title(f"supply of {supply} K$_s$" + (", assumed for all other figures" if supply == 10 else ""))
     for axes in panels[:-1]:
         axes.set_xlabel("")
@@ -68,20 +68,21 @@ def scale(last: float, hours: float) -> ScalarMappable:
     return ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
 
 
-def span(drawn: list[State]) -> tuple[float, float]:
-    """x (um) from the first to the last outline, with MARGIN on both sides."""
-    return min(s.rim[:, 0].min() for s in drawn) - MARGIN, max(s.rim[:, 0].max() for s in drawn) + MARGIN
+def span(drawn: list[State], margin: float = MARGIN) -> tuple[float, float]:
+    """x (um) from the first to the last outline, with a margin on both sides."""
+    return min(s.rim[:, 0].min() for s in drawn) - margin, max(s.rim[:, 0].max() for s in drawn) + margin
 
 
-def fill(axes: Axes, drawn: list[State], colours: ScalarMappable, reach: tuple[float, float]) -> None:
-    """Draw outlines in their channel over a range of x, the latest at the back."""
-    style.pore(axes, reach, drawn[0].width, 2.5)
+def fill(axes: Axes, drawn: list[State], colours: ScalarMappable, reach: tuple[float, float],
+         margin: float = MARGIN) -> None:
+    """Draw outlines in their channel over a range of x with a margin, the latest at the back."""
+    style.pore(axes, reach, drawn[0].width, margin / 6)
     for state in reversed(drawn):
         style.aggregate(axes, smooth(state.rim, state.width), facecolor=colours.to_rgba(state.time), edgecolor="white",
                         linewidth=0.9)
-    first, high = reach[0] + MARGIN, 0.5 * drawn[0].width
-    style.arrow(axes, (first - 0.95 * MARGIN, high), (first - 0.2 * MARGIN, high), 8, 1.4)
-    axes.text(first - 0.9 * MARGIN, high + 4, "flow", color=style.BLUE, ha="left", va="bottom", fontsize=7)
+    first, high = reach[0] + margin, 0.5 * drawn[0].width
+    style.arrow(axes, (first - 0.95 * margin, high), (first - 0.2 * margin, high), 8, 1.4)
+    axes.text(first - 0.9 * margin, high + 0.27 * margin, "flow", color=style.BLUE, ha="left", va="bottom", fontsize=7)
 
 
 def smooth(rim: np.ndarray, width: float) -> np.ndarray:
@@ -114,12 +115,14 @@ def caption(*folders: Path) -> str:
     velocity = states.series(folders[0])["mean_velocity_m_per_d"][0]
     results = "; ".join(f"({letter}) {supply} K_s: {_course(folder)}"
                         for letter, supply, folder in zip("abc", SUPPLIES, folders))
+    usual, longer = (request.load().pore.length for request in (RUNS[0], RUNS[-1]))
     return (f"The aggregate of Wide every {EVERY:g} h, between the walls of a pore {drawn[0].width:.0f} µm wide at a "
             f"constant mean velocity of {velocity:.1f} m/d, from left to right. The paper prints no supply for its "
             "Figure 6, and no times or places of tips from which to infer one: 10 K_s of both substrates is assumed "
-            f"elsewhere. {results}. The panel with 10 K_s shows the converged solution by which the claims are judged "
-            "(preset `accurate`), the others the preset `fast`, none of them the paper's scheme. Between the walls a "
-            f"spline joins the nodes of the outline. {_endings(folders)}")
+            f"elsewhere. {results}. In (c) the pore is {longer:.0f} µm long instead of {usual:.0f}, which this "
+            "aggregate outgrows, and the scale is smaller. (b) shows the converged solution by which the claims are "
+            "judged (preset `accurate`), the others the preset `fast`, none of them the paper's scheme. Between the "
+            f"walls a spline joins the nodes of the outline. {_endings(folders)}")
 
 
 def _course(folder: Path) -> str:

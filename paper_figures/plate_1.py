@@ -18,7 +18,7 @@ CLAIMS = ("C03", "C04", "C05", "C06", "C10", "C33")
 
 CONTOURS = 20
 #: The values that the paper prints, K_s. It names the donor at the inlet, but the number is the acceptor's (E9).
-PRINTED_INLET, PRINTED_EFFLUENTS = {"acceptor": " (~7)", "donor": ""}, {"acceptor": "4.19", "donor": "6.13"}
+PRINTED_INLET, PRINTED_EFFLUENTS = {"acceptor": " (~7*)", "donor": ""}, {"acceptor": "4.19", "donor": "6.13"}
 
 
 @style.styled
@@ -68,7 +68,7 @@ def caption(folder: Path) -> str:
             f"flow-weighted mean of the acceptor falls from {acceptor[0]:.2f} mg/L at the inlet of the meshed part to "
             f"{acceptor[1]:.2f} mg/L at the outlet, "
             f"the donor from {donor[0]:.2f} to {donor[1]:.2f} mg/L (1 mg/L is 1 K_s; the values in parentheses are "
-            f"printed){_start(folder, shaped)}. (c, d) "
+            f"printed; * the paper prints ~7 as the donor's, E9){_start(folder, shaped)}. (c, d) "
             "Active and inert biomass over X_m, from which (34) leaves the density 0.1 % apart at the interface: "
             f"X_A from {active.min():.4f} to {active.max():.4f}, X_I from {inert.min():.5f} to "
             f"{inert.max():.5f}. Each panel has {CONTOURS} equally spaced contour lines and a separate colour scale.")

@@ -66,11 +66,12 @@ WIDE = Request("wide")
 #: contact, and a spline through their nodes is not smooth.
 WIDE_CONVERGED = Request("wide", (*converged(1.0), rows_at(*range(1, 35), *(34 + 0.1 * k for k in range(1, 10)),
                                                            *range(35, 46))), "wide_converged")
-#: Figure 6 with other supplies (the paper prints none): supply of both substrates in K_s, and the last hour. With 40
-#: K_s the aggregate reaches the end of the pore at 33.3 h.
+#: Figure 6 with other supplies (the paper prints none): supply of both substrates in K_s, the last hour, and the length
+#: of the pore in um. With 40 K_s the aggregate reaches the end of Wide's 600 um at 33.3 h.
 SUPPLIED = {supply: Request("wide", ('numerics.preset="fast"', *until(*range(1, end + 1)),
-                                     *(f'substrates.{name}.supply="{supply} mg/L"' for name in ("acceptor", "donor"))),
-                            f"wide_{supply}_K_s") for supply, end in ((5, 55), (40, 45))}
+                                     *(f'substrates.{name}.supply="{supply} mg/L"' for name in ("acceptor", "donor")),
+                                     *lengthened), f"wide_{supply}_K_s")
+            for supply, end, lengthened in ((5, 55, ()), (40, 45, ('pore.length="2400 um"',)))}
 #: Figure 4: only geometry and mesh.
 INITIAL_MESH = Request("initial_mesh")
 

@@ -32,3 +32,8 @@ def added(name: str, interface: str) -> Added:
     number = json.loads((FOLDER / "flow.json").read_text(encoding="utf-8"))[f"{name}, {interface}"]
     return Added(number["added_um"], number["bar_um"])
 
+
+def traction_effect(name: str, pore: float = 600.0) -> float:
+    """Conductivity of a pore of a length (um) with an outline in the traction form, over that in the Laplacian form."""
+    laplacian, traction = (pore + added(name, form).length for form in ("laplacian", "traction"))
+    return laplacian / traction

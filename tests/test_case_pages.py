@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from tests.blocks import ROOT
+from verification import validation
 from verification.evidence import case_pages, pages
 from verification.evidence.cases import KINDS, STAGES, cases
 
@@ -29,9 +30,14 @@ def test_a_page_has_claim_norm_numbers_mutants_and_the_command(tmp_path):
 
 
 def test_the_index_has_a_line_a_case_with_stage_kind_elements_and_equations(monkeypatch):
+    """Lines of the sections of the validation follow; together they have every kind."""
     monkeypatch.setattr(pages, "mutant_state", str)
-    rows = [line.split(" | ") for line in case_pages.index(RECORDS)[-1].splitlines()[2:]]
+    lines = [line.split(" | ") for line in case_pages.index(RECORDS)[-1].splitlines()[2:]]
+    rows, others = lines[:len(cases())], lines[len(cases()):]
     assert [row[0] for row in rows] == [f"| [{id}]({id}.md)" for id in cases()]
+    assert len(others) == len(validation.SECTIONS) and {row[2] for row in others} == {"validation"}
+    assert "(../../docs/validation.md#the-lubrication-limit-of-a-narrow-gap)" in others[-1][0]
+    assert {row[2] for row in lines} == {*KINDS}
     assert {row[1] for row in rows} == {*STAGES} and {row[2] for row in rows} <= {*KINDS}
     assert all(row[3] and row[4] for row in rows)
 

@@ -28,8 +28,17 @@ def test_a_changed_record_changes_the_page():
 
 
 def test_verdicts_are_words_and_a_prediction_has_none():
-    assert {row[3] for rows in RECORD.values() for row in rows} == set(validation.VERDICTS.values())
+    words = {*validation.VERDICTS.values(), *validation.EFFECTS.values()}
+    assert {row[3] for rows in RECORD.values() for row in rows} <= words
     assert {row[3] for row in RECORD["figure_1"]} == {""}
+
+
+def test_a_change_without_a_source_is_counted_without_a_verdict():
+    record = {"jiao": [["q", "", "", word] for word in ("agrees", "disagrees", "", "does not matter", "matters")]}
+    assert [counted[1:] for counted in validation.counts(PAGE, record)] == [(1, 1, 3)]
+
+
+def test_no_number_of_the_record_is_missing():
     assert not any("nan" in cell or "inf" in cell for rows in RECORD.values() for row in rows for cell in row)
 
 
@@ -42,6 +51,13 @@ def test_two_exponentials_agree_with_the_columns_and_one_does_not(exponents, ver
     left = np.exp(-exponents[0] * np.minimum(fraction, half) - exponents[1] * np.maximum(fraction - half, 0))
     row = validation._exponential("made", fraction, left)
     assert row[3] == verdict and row[2] == f"1.00, {exponents[1] / exponents[0]:.2f}"
+
+
+def test_only_a_factor_of_2000_that_is_reached_has_a_time():
+    hours = np.array([0.0, 24.0, 48.0])
+    assert validation._expanded(hours, np.array([1.0, 2000.0, 4e6])) == (pytest.approx(24.0), "24")
+    time, words = validation._expanded(hours, np.array([1.0, 20.0, 400.0]))
+    assert math.isnan(time) and words == "not until 48 h, 400 times"
 
 
 def test_a_curve_that_bends_is_no_exponential():

@@ -84,10 +84,9 @@ def cylinder(rings: int, inner: float, increase: float) -> Cylinder:
         {table}
 
         With the printed sign most of these eigenvalues are positive: as the stabilisation rises from zero to the
-        printed one, the matrix becomes singular once for each of them. At the end it need not be singular, and
-        a solver may return a solution. But this solution is noise, and refinement does not improve it. Without
-        the term the pressure of this smooth case is less accurate, and the condition of the matrix is hundreds
-        of times worse.""",
+        printed one, the matrix becomes singular once for each of them. A solver may return a solution with the printed
+        sign, but it is noise; finer meshes do not help. Without the term the pressure of this smooth case is less
+        accurate, and the condition of the matrix is hundreds of times worse.""",
     quick=True)
 def stabilisation_sign() -> Numbers:
     """Inertia, condition and error with the stabilisation subtracted, left out, and added."""

@@ -6,6 +6,7 @@ its case, from its code, and from the records ``evidence.json`` and ``mutants.js
 
 import inspect
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -13,10 +14,11 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from verification import validation
 from verification.evidence import convergence, pages
 from verification.evidence.cases import KINDS, Case, cases
 from verification.evidence.matrix import cases_of, parts, references_of
-from verification.evidence.writing import REPORT, ROOT, page, table
+from verification.evidence.writing import REPORT, ROOT, load, page, table
 from verification.mutants import runner
 
 #: Texts on the drawing and on the picture of the errors.
@@ -63,15 +65,29 @@ def _modules(room: str) -> list[Path]:
 
 
 def index(records: Mapping[str, Mapping]) -> list[str]:
-    """The blocks of the index: a line a case."""
+    """The blocks of the index: a line a case, and a line a section of the comparisons with measurements."""
     head = ("case", "stage", "kind", "elements and presets", "equations", "verdict", "claim")
     rows = [(f"[{id}]({id}.md)", cases()[id].stage, cases()[id].kind, "; ".join(cases()[id].numerics),
              "; ".join(equations()[id]), record["verdict"], cases()[id].claim) for id, record in records.items()]
+    rows += _validations()
     kinds = "; ".join(f"*{kind}*, {words}" for kind, words in KINDS.items() if kind in {row[2] for row in rows})
     return [f"**{pages.summary(records.values())}** {pages.mutant_state()}",
             f"Kinds: {kinds}. Menus above the table choose stage, kind, elements, presets and equations; the field "
-            "filters by words. Elements of order 1 are linear, those of order 2 quadratic. Comparisons with "
-            "measurements are on the page [Validation](../../docs/validation.md).", table(head, rows)]
+            "filters by words. Elements of order 1 are linear, those of order 2 quadratic. The last lines are the "
+            "sections of the page [Validation](../../docs/validation.md).", table(head, rows)]
+
+
+def _validations() -> list[tuple[str, ...]]:
+    """A line for each section of the page of the validation, with the number of its rows by verdict."""
+    text = validation.PAGE.read_text(encoding="utf-8")
+    return [(f"[{heading.partition(':')[0]}](../../docs/validation.md#{_anchor(heading)})", "", "validation", "", "",
+             f"{agree} agree, {disagree} disagree, {others} without a verdict", heading)
+            for heading, agree, disagree, others in validation.counts(text, load(validation.RECORD, {}))]
+
+
+def _anchor(heading: str) -> str:
+    """The anchor of a heading on the site."""
+    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
 
 
 def article(case: Case, record: Mapping, folder: Path) -> list[str]:
