@@ -176,7 +176,7 @@ def test_meeting(preset, record):
 #: written before a run was measured. Until 2026-11-30 10:40 the time included the flow under forces: 1.44 for 4.
 COST = 1.2
 #: Numbers of equal aggregates; repetitions, of which the fastest counts; and the distance between two (um).
-COUNTS, REPEATS, APART = (1, 2, 4, 8), 6, 250.0
+COUNTS, REPEATS, APART = (1, 2, 4, 8), 4, 250.0
 #: Changes of a scene, and its end.
 COST_SCENES = {
     "one wall": (('aggregate.radius="12 um"',), "4 h"),
