@@ -210,7 +210,7 @@ COMMON = {
     "norm": "checks that fail, of each member; the head loss of 172 is not judged",
     "mutants": ("family-jump-late", "family-half-saturation", "family-rest-of-the-pore-forgotten",
                 "family-rows-end-steps", "family-effluent-not-weighted", "family-inhibition", "family-decay-limited",
-                "family-absent-donor-limits", "family-resumed-on-one-wall"),
+                "family-absent-donor-limits"),
     "references": ("run_files",), "runs_with": "2 fast accurate",
     "omitted": "members have quadratic triangles, straight ones run where advice names them; hard-01 to hard-23 run "
                "order 1, paper and exact"}

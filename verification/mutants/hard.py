@@ -116,13 +116,6 @@ MUTANTS = (
          "place = np.empty(len(rank), np.int32)",
          "place = np.empty(len(rank), np.uint16)")),
     *changes(
-        "repro/runs/state_arrays.py",
-        ("family-resumed-on-one-wall",
-         "A resumed run has the seat of the first aggregate for all.",
-         "_body",
-         'plain["seats"][number]',
-         'plain["seats"][0]')),
-    *changes(
         "repro/scene/time_table.py",
         ("family-jump-late",
          "A table has its old value at the time of a jump.",
