@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from repro import simulate
 from repro.errors import MeshError
 from repro.fem import mesher, sizing, transfer
 from repro.fem.outline import half_disc
@@ -54,6 +55,15 @@ def test_each_of_two_equal_aggregates_comes_into_contact(order):
     assert second.area == pytest.approx(first.area, rel=1e-3)
     lengths = [each.contact_length(pore.mesh.walls[1]) for each in (first, second)]
     assert lengths[1] == pytest.approx(lengths[0], rel=0.02)  # the meshes differ; 0.4 % is measured
+
+
+def test_an_aggregate_comes_into_contact_after_another():
+    """The lines of the first one have predicted positions then, those of the second one do not."""
+    scene = load_scene("base", [
+        "numerics.preset=fast", "numerics.refinement=0.2", 'pore.width="20 um"', 'pore.length="150 um"',
+        'aggregate=[{radius="17.98 um", position="-40 um"}, {radius="17.9 um", position="40 um"}]',
+        'flow.mean_velocity="2.9 m/day"', 'growth.end="0.08 h"', 'output.times=["0.08 h"]'], unset=["flow.head"])
+    assert [report.pore.spanning for report in simulate(scene)] == [0, 2]
 
 
 @EVERY_ORDER

@@ -11,8 +11,10 @@ from repro.fem import recession
 from repro.fem.outline import half_disc, polygon
 from repro.fem.walls import BOTTOM, FREE, channel_walls
 from repro.march import eroding
+from repro.march.state import Report
 from repro.model.erosion import Erosion
 from repro.model.meshing import seeded
+from repro.model.solving import Solver
 from repro.model.stages import Stages
 from repro.runs.status import is_over
 from repro.scene import SceneError, load_scene
@@ -108,6 +110,47 @@ def test_what_is_inside_keeps_its_composition():
     (body,) = rest.bodies
     assert body.theta == pytest.approx(1.0, abs=1e-9)
     assert np.array_equal(body.reference, rest.mesh.points[rest.region.nodes])
+
+
+#: Two half-discs whose radii, places and walls differ: number, radius (um) and place (um).
+TWO = ((0, 10.0, -40.0, "lower"), (1, 6.0, 30.0, "upper"))
+SEEDS = ", ".join(f'{{radius="{radius} um", position="{x} um", wall="{wall}"}}' for _, radius, x, wall in TWO)
+
+
+def column(row, number):
+    return row[f"aggregate_{number + 1}_eroded_ug_per_m_per_h"]
+
+
+@pytest.mark.parametrize("number, radius", [body[:2] for body in TWO])
+@pytest.mark.parametrize("law, coefficient, power", [("constant", 0.3, 1), ("thickness squared", 0.02, 3)])
+def test_each_aggregate_has_the_rate_at_which_it_erodes(number, radius, law, coefficient, power):
+    """X_m times the integral over the half-circle: pi v R, and pi k R^3 / 2. A run of one aggregate has no column."""
+    scene = load_scene(shaped(erosion(law, coefficient)), [f"aggregate=[{SEEDS}]"])
+    pore = seeded(scene)
+    row = results.row(scene, Report(pore, Solver.of(scene).solve(pore), None, (), 0, {}))
+    swept = np.pi * coefficient * radius**power * {1: 1.0, 3: 0.5}[power]
+    expected = 1e-6 * scene.kinetics.maximum_density * swept
+    assert column(row, number) == pytest.approx(expected, rel=2e-4)  # arcs of fast
+    assert not [name for name in results.column_names(growing_disc(10.0)) if "eroded" in name]
+    without = load_scene(shaped(), [f"aggregate=[{SEEDS}]"])
+    assert column(results.row(without, Report(pore, Solver.of(without).solve(pore), None, (), 0, {})), number) is None
+
+
+@pytest.mark.parametrize("number", [body[0] for body in TWO])
+@pytest.mark.parametrize("law, coefficient, error", [
+    ("constant", 0.3, 1e-12), ("thickness squared", 0.01, 1e-4), ("shear", 400.0, 0.02)])
+def test_the_eroded_rate_is_what_an_aggregate_loses(number, law, coefficient, error):
+    """In a duration dt an aggregate loses dt times the mean of its rates before and after, with an error of dt^3. By
+    shear the meshes before, half-way and after differ: 1.2, 0.2, 0.12, 0.05 % at refinements of 0.3, 0.6, 1.2, 2.4."""
+    scene = load_scene(shaped(), [f"aggregate=[{SEEDS}]", 'flow.mean_velocity="2.9 m/day"', erosion(law, coefficient)])
+    solver, duration = Solver.of(scene), 0.05
+    before = seeded(scene)
+    after = Erosion.of(scene).erode(before, duration, 0.0)
+    rates = [column(results.row(scene, Report(pore, solver.solve(pore), None, (), 0, {})), number)
+             for pore in (before, after)]
+    lost = before.bodies[number].mass - after.bodies[number].mass
+    assert lost > 1e-3 * before.bodies[number].mass
+    assert 1e-6 * lost / duration == pytest.approx(np.mean(rates), rel=error)
 
 
 def run(scene):

@@ -62,8 +62,10 @@ THOROUGH_SCENES = {
     "gear with forces": ("numerics.refinement=0.3", 'numerics.transport="gear"', 'growth.fluid_forces="included"',
                          'growth.end="0.6 h"'),
     "fast, stress-free": ('numerics.preset="fast"', 'growth.new_biomass="stress_free"', *CONTACT),
-    "fast, erosion": ('numerics.preset="fast"', 'growth.new_biomass="stress_free"', 'growth.end="3 h"',
-                      'growth.erosion={law="shear", shear_coefficient="20 um/h/Pa"}', 'output.times=["1 h", "3 h"]'),
+    "fast, erosion of two aggregates": (
+        'numerics.preset="fast"', 'growth.new_biomass="stress_free"', 'growth.end="3 h"',
+        'aggregate=[{radius="12 um", position="-30 um"}, {radius="9 um", position="20 um", wall="upper"}]',
+        'growth.erosion={law="shear", shear_coefficient="20 um/h/Pa"}', 'output.times=["1 h", "3 h"]'),
     "fast, a missed tolerance": ('numerics.preset="fast"', "numerics.tolerance=1e-12", "growth.time_step=1 h",
                                  "growth.end=0.0205 h", 'output.times=["4.2e-3 h", "0.0205 h"]'),
     "fast, to a detachment": ('numerics.preset="fast"', "growth.time_step=0.5 h", "growth.end=3 h",

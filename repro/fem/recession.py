@@ -54,6 +54,17 @@ def directions(outline: Outline) -> np.ndarray:
     return moves
 
 
+def swept(outline: Outline, speeds: np.ndarray) -> float:
+    """um2/h, area that the free surface passes per time; speeds: (M,) um/h at the nodes.
+
+    Contact lines add nothing: they only follow the surface.
+    """
+    first, second = arc_derivatives(outline.arcs(outline.points))
+    lengths = np.stack([np.hypot(*(first + t * second).T) for t in (0.0, 0.5, 1.0)], axis=1)
+    over_arcs = (outline.arcs(speeds) * lengths) @ (1 / 6, 2 / 3, 1 / 6)  # Simpson's rule
+    return float(over_arcs[outline.edge_wall == FREE].sum())
+
+
 def moved(outline: Outline, moves: np.ndarray) -> Outline:
     """The outline after moves (M, 2) um of its free nodes and contact lines. Nodes between contact
     lines follow. Raises ContactEroded if a contact surface vanishes."""

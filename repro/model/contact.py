@@ -107,7 +107,8 @@ def _on_small_triangles(mechanics: Mechanics, grown: Pore, theta: Sequence[np.nd
         fine, fine_theta, bisection = _bisected(grown, theta, lines, search.line_size)
         shape = _expand(mechanics, fine, fine_theta, divided_start(start, fine, bisection), search)
         shape = replace(shape, bisection=bisection)
-        missed = [abs(length - search.advances[key]) for key, length in shape.advances.items()]
+        missed = [abs(length - search.advances[key]) for key, length in shape.advances.items()
+                  if key in search.advances]  # an aggregate may make its first contact
         if max(missed) <= MISSED * search.line_size:
             break
         search = replace(search, advances=shape.advances)

@@ -125,10 +125,29 @@ class Erosion:
             recession.refuse_invalid(outline, walls)
         return remeshing.within(self.remeshing, pore, receded, speed)
 
+    def rate(self, pore: Pore, number: int, water: Flow | None) -> float:
+        """um2 mg/L/h, biomass of the density X_m that the aggregate with index ``number`` loses.
+
+        water: the flow in ``pore``, None without [flow].
+        """
+        outline = pore.outlines[number]
+
+        def shear(_: Outline) -> np.ndarray:
+            drive = at_time(needed(self.solver.drive, "[flow]"), pore.time)
+            return surface_shear(pore.space, needed(water, "[flow]"), drive, outline,
+                                 pore.mesh.regions[number])
+
+        passed = recession.swept(outline, self._speeds(pore, outline, shear))
+        return self.remeshing.maximum_density * passed
+
+    def _speeds(self, pore: Pore, outline: Outline, shear: Shear) -> np.ndarray:
+        """(M,) um/h at the nodes of an outline."""
+        own, *_ = outline.seat.walls(pore.mesh.walls)
+        return self.law.speeds(outline, own, shear)
+
     def _velocities(self, pore: Pore, outline: Outline, shear: Shear) -> np.ndarray:
         """(M, 2) um/h of the nodes of an outline."""
-        own, *_ = outline.seat.walls(pore.mesh.walls)
-        return self.law.speeds(outline, own, shear)[:, None] * recession.directions(outline)
+        return self._speeds(pore, outline, shear)[:, None] * recession.directions(outline)
 
     def _receded(self, pore: Pore, outline: Outline, shear: Shear, duration: float) -> Outline:
         """An outline after a duration (h) with its speed at the start."""

@@ -31,6 +31,7 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "biomass": lambda scene, at: bool(at.pore.bodies) and scene.kinetics is not None,
     "substrates": lambda scene, at: at.solved.concentrations is not None,
     "growth": lambda scene, at: NEEDS["seed"](scene, at) and scene.growth is not None,
+    "erosion": lambda scene, at: scene.growth is not None and scene.growth.erosion is not None,
     "adhesion": lambda scene, at: (
         scene.growth is not None and bool(at.pore.bodies) and at.pore.accumulates
         and (scene.growth.bonded or scene.growth.has_fluid_forces
@@ -118,6 +119,11 @@ def _load(part: str, k: int, scene: Scene, at: Report) -> float:
 def _uptake(substrate: int, k: int, scene: Scene, at: Report) -> float:
     from repro.model.substrates import uptakes  # a scene without [substrates] does not load it
     return float(uptakes(at.solved.problem, at.pore, at.solved.concentrations)[k, substrate])
+
+
+def _eroded(k: int, scene: Scene, at: Report) -> float:
+    from repro.model.erosion import Erosion  # a scene without erosion does not load it
+    return Erosion.of(scene).rate(at.pore, k, at.solved.flow)
 
 
 def _growth(scene: Scene, at: Report) -> float:
@@ -306,6 +312,9 @@ BODY = (
                "integral of (7)-(8) over it, at the present concentrations", partial(_uptake, k),
                f"{name} uptake", f"{name} and biomass", signed=True)
       for k, name in enumerate(SUBSTRATES)),
+    Quantity("aggregate_NAME_eroded_ug_per_m_per_h", "erosion",
+             "X_m times the integral of the speed of erosion over its free surface, in the present "
+             "flow", _eroded, "erosion", "erosion"),
     Quantity("aggregate_NAME_surface_stretch_min",
              "least elastic stretch along the free surface", "as surface_stretch_min",
              lambda k, scene, at: surfaces(at.pore)[k].least, "least stretch", "growth"),

@@ -1,24 +1,31 @@
 """A family of hostile scenes, drawn by seed. Each is right, or is refused with advice that works.
 
 A member runs with the preset ``fast``, and a second time with other rows or with ``accurate``. ``reference.run_files``
-judges the folders. If a run is refused, its advice is applied, and the new run must be right.
+judges the folders. A member with several aggregates is also killed and resumed, and must have the same files. If a run
+is refused, its advice is applied, and the new run must be right.
 ``pytest "verification/cases/hard_family.py::test_family[seed 17]"`` runs one member, and shows its scene if a check
 fails.
 """
 
 import json
+import os
 import re
+import signal
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass
+from itertools import count
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
 
 from reference import run_files
 from repro.errors import SimulationError
-from repro.runs.execution import run
+from repro.polling import polling
+from repro.runs.execution import Watch, run
 from repro.scene import SceneError, load_scene
 from verification.evidence.checks import Check, at_most
 from verification.problems import hostile
@@ -31,6 +38,9 @@ MEMBERS = 220
 #: Cheap members, in ``make test``. ``make verify`` runs the others too.
 QUICK = (0, 2, 3, 6, 8, 9, *range(164, 171), 191, 204)
 REST = tuple(seed for seed in range(MEMBERS) if seed not in QUICK)
+#: Number of times that a member with several aggregates is killed, and files without results in its folder.
+KILLS = 3
+RECORDS = ("run.json", "report.html", "checkpoint.last")
 #: Checks that are not judged. By zero order the growth of 172 jumps at a front in the aggregate, on which ``fast``
 #: puts a few elements: its thickness is wrong by 0.2 %, and the head loss of the film above it, a sixth of the width,
 #: by 1.6 %.
@@ -56,10 +66,11 @@ ADVICE = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """Files of a run, or None, and the message of its refusal, or ""."""
+    """Files of a run, or None; the message of its refusal, or ""; and how often Newton's methods polled."""
 
     files: run_files.Run | None
     refusal: str
+    polls: int
 
 
 def judge(seed: int) -> list[Check]:
@@ -74,6 +85,8 @@ def _judged(tables: dict, seed: int, room: Path) -> Iterator[Check]:
     yield from _checks(first, tables, room)
     if first.refusal:
         return
+    if seed >= hostile.FIRST_BODIES:
+        yield _killed(tables, seed, room, first.polls)
     rows = (seed + seed // len(hostile.KINDS)) % 2 == 0 or hostile.kind(seed) in hostile.TRANSIENT
     second = hostile.with_other_rows(tables, seed) if rows else _changed(tables, "numerics.preset", "accurate")
     other = _outcome(second, room / "second")
@@ -86,14 +99,50 @@ def _judged(tables: dict, seed: int, room: Path) -> Iterator[Check]:
 def _outcome(tables: dict, folder: Path) -> Outcome:
     """Run a scene. One that takes too long counts as refused. Any other exception propagates."""
     refusal = ""
+    polls = count()
     try:
         scene = load_scene(tables)
-        with limited(LIMIT * len(scene.aggregates)):
+        with limited(LIMIT * len(scene.aggregates)), polling(lambda: next(polls)):
             run(scene, folder)
     except (SceneError, SimulationError, TooLong) as failure:
         refusal = str(failure)
     files = run_files.Run(folder, tables) if (folder / "timeseries.csv").is_file() else None
-    return Outcome(files, refusal)
+    return Outcome(files, refusal, next(polls))
+
+
+def _killed(tables: dict, seed: int, room: Path, polls: int) -> Check:
+    """Check that a run has the files of that in room / "fast" if it is killed within steps and resumed.
+
+    polls: of the run in room / "fast". Each kill comes before half of them, so the first one is within the run.
+    """
+    folder = room / "killed"
+    for last in np.random.default_rng((seed, 2)).integers(1, 1 + polls // 2, KILLS):
+        child = get_context("fork").Process(target=_run_until, args=(tables, folder, int(last)))
+        child.start()
+        child.join()
+    run(load_scene(tables), folder)
+    expected, computed = _files(room / "fast"), _files(folder)
+    different = [name for name in {*expected, *computed} if expected.get(name) != computed.get(name)]
+    resumes = len(json.loads((folder / "run.json").read_text())["resumes"])
+    return at_most("files that kills and resumes change", len(different) + (resumes == 0), 0, "bit for bit")
+
+
+def _run_until(tables: dict, folder: Path, last: int) -> None:
+    """Run or resume a scene with a checkpoint after each step, and kill the process at the poll with a number."""
+    polls = count(1)
+
+    def kill() -> int:
+        if next(polls) == last:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 0
+
+    run(load_scene(tables), folder, Watch(interval=0.0, stop_within=kill))
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    """{name: content} of the files with results in a folder."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*")
+            if path.is_file() and path.name not in RECORDS}
 
 
 def _checks(outcome: Outcome, tables: dict, room: Path) -> Iterator[Check]:
@@ -156,7 +205,8 @@ def member(seed: int) -> Check:
 COMMON = {
     "kind": "property",
     "claim": "Hostile scenes drawn by seed: balances, bounds, stoichiometry, area against mass and flow in the files, "
-             "the same rows with other rows, fast against accurate, or a refusal with advice that works",
+             "the same rows with other rows, fast against accurate, the same files of several aggregates after kills, "
+             "or a refusal with advice that works",
     "norm": "checks that fail, of each member; the head loss of 172 is not judged",
     "mutants": ("family-jump-late", "family-half-saturation", "family-rest-of-the-pore-forgotten",
                 "family-rows-end-steps", "family-effluent-not-weighted", "family-inhibition", "family-decay-limited",

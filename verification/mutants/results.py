@@ -40,6 +40,7 @@ CHECKPOINT = "tests/test_checkpoint.py::test_"
 WALLS = "tests/test_walls.py::test_"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
+EROSION = "tests/test_erosion.py::test_"
 SEVERAL = "tests/test_several_aggregates.py::test_"
 
 MUTANTS = (
@@ -96,6 +97,12 @@ MUTANTS = (
          "uptakes(at.solved.problem, at.pore, at.solved.concentrations)[k, substrate]",
          "uptakes(at.solved.problem, at.pore, at.solved.concentrations)[0, substrate]",
          f"{SEVERAL}columns_of_bodies_add_up_to_those_of_all[fast]"),
+        ("eroded-rate-of-the-first",
+         "The column of each aggregate's erosion has that of the first.",
+         "_eroded",
+         "Erosion.of(scene).rate(at.pore, k, at.solved.flow)",
+         "Erosion.of(scene).rate(at.pore, 0, at.solved.flow)",
+         f"{EROSION}each_aggregate_has_the_rate_at_which_it_erodes[constant-0.3-1-1-6.0]"),
         ("area-of-the-largest",
          "The area of several aggregates is that of the largest one.",
          "",
@@ -230,6 +237,12 @@ MUTANTS = (
          'Compression(*plain["compression"])',
          "Compression()",
          f"{CHECKPOINT}a_state_is_packed_and_unpacked_to_the_last_bit"),
+        ("resumed-with-other-names",
+         "A resumed run has the names of the aggregates in the opposite order.",
+         "_body",
+         'plain["names"][number]',
+         'plain["names"][::-1][number]',
+         "verification/cases/hard_family.py::test_family[seed 204]"),
         ("last-shape-dropped",
          "A checkpoint lacks the last shape.",
          "_body_arrays",
