@@ -3,15 +3,19 @@
 `test_ends.py` tests the ends of runs by a strength, `test_derived.py` these stresses, and `test_longer.py` a run with a
 bonded wall that is made longer.
 """
+import json
+
 import numpy as np
 import pytest
 
+from repro.errors import GrowthError, SimulationError
 from repro.fem import elements
 from repro.model import adhesion, contact, remeshing
 from repro.model.finer_lines import with_finer_lines
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
+from repro.runs.execution import run
 from repro.scene import load_scene
 from tests.strategies import coarse_base
 
@@ -38,6 +42,17 @@ def test_stresses_are_those_of_the_equilibrium_on_a_new_mesh(monkeypatch):
     for computed, peaks in zip(reported, (adhesion.wall_peaks, adhesion.tensile_peaks)):
         peaks.cache_clear()
         assert computed == pytest.approx(peaks(loading, rest, None)[0].value, rel=1e-12)
+
+
+def test_stresses_without_an_equilibrium_end_a_run_with_its_time(tmp_path, monkeypatch):
+    """The equilibrium of a row's stresses may fail where that of the run does not."""
+    def none(*arguments):
+        raise GrowthError("there is no equilibrium")
+
+    monkeypatch.setattr(adhesion, "equilibrium", none)
+    with pytest.raises(SimulationError, match="t = 0 h, in growth: there is no equilibrium"):
+        run(load_scene("base", ["numerics.preset=fast", "growth.bonding_strength=1 GPa"]), tmp_path / "run")
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["status"].startswith("failed: ")
 
 
 def test_theta_of_parts_stays_positive_and_keeps_its_sum():

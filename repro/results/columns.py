@@ -8,7 +8,7 @@ from typing import Any
 from repro.fem.walls import BOTTOM, TOP, numbered
 from repro.march import balance
 from repro.march.balance import Ledger
-from repro.march.state import Report
+from repro.march.state import Report, stopping
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.surface import BESIDE, STRETCH, least_stretched, surfaces
 from repro.model.transport_in_time import transport_in_time
@@ -97,9 +97,13 @@ def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> li
 
 
 def _adhesion(part: str, scene: Scene, at: Report) -> Any:
-    """Call a function of the stresses of aggregates, which a scene without growth does not load."""
+    """Call a function of the stresses of aggregates, which a scene without growth does not load.
+
+    Raises SimulationError if the stresses have no equilibrium.
+    """
     from repro.model import adhesion
-    return getattr(adhesion, part)(adhesion.Loading.of(scene), at.pore, at.solved)
+    with stopping(at.pore.time, scene.growth.bonded):
+        return getattr(adhesion, part)(adhesion.Loading.of(scene), at.pore, at.solved)
 
 
 def _all(value: Callable[[int, Scene, Report], float],

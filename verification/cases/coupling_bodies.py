@@ -12,7 +12,6 @@ from reference import gold_pair
 from repro import Meeting, load_scene, simulate, solve
 from repro.fem.walls import TOP, WELD, numbered
 from repro.model import contact, flow, substrates
-from repro.model.meshing import sized
 from repro.results.tables import Results
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_most, each_at_most

@@ -91,6 +91,12 @@ MUTANTS = (
          f"{SEVERAL}finer_elements_at_t_0_keep_the_shape_of_the_pore[False]")),
     *changes(
         "repro/results/columns.py",
+        ("stresses-outside-the-run",
+         "An error of a row's stresses has no time, and is none of the run's.",
+         "_adhesion",
+         "stopping(at.pore.time, scene.growth.bonded)",
+         "__import__('contextlib').nullcontext()",
+         "tests/test_detachment.py::test_stresses_without_an_equilibrium_end_a_run_with_its_time"),
         ("uptake-of-the-first",
          "The column of each aggregate's uptake has that of the first.",
          "_uptake",
