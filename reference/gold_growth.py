@@ -1,4 +1,4 @@
-"""Uniform growth into a wall, and on a bonded wall, by another code, NGSolve, with the bars of its own refinement.
+"""Uniform growth into a wall, on a bonded wall, and of two aggregates that weld, by another code, NGSolve, with bars.
 
 ``reference/gold/growth.py`` computed the numbers: positions of fourth order, pressures of third order, elements that
 shrink towards contact lines, and the contact line as an unknown. ``reference/gold/growth.json`` has them.
@@ -34,7 +34,8 @@ class Grown(NamedTuple):
 
 @cache
 def states(kind: str) -> tuple[Grown, ...]:
-    """States of a kind, in the order of the file: "touching" the upper wall, or "bonded" to the lower one."""
+    """States of a kind, in the order of the file: "touching" the upper wall, "bonded" to the lower one, or "welded":
+    two that face each other in a pore of twice the width."""
     rows = json.loads(FILE.read_text(encoding="utf-8"))[kind]
     return tuple(Grown(row["radius_um"], row["theta"],
                        {name.removesuffix("_um"): Number(**number) for name, number in row.items()

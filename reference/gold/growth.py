@@ -1,4 +1,4 @@
-"""Uniform growth into a wall, and on a wall to which an aggregate is bonded, by NGSolve.
+"""Uniform growth into a wall, into a plane of symmetry, and on a wall to which an aggregate is bonded, by NGSolve.
 
     make gold
 
@@ -25,6 +25,10 @@ the line along the wall, has a gap to the wall of at least
 At the line, gap and bound are zero. Beside it the surface opens like the root of d, faster than the bound. The rule is
 tested from 1e-5 um on, and binds at 2.8 to 6.7 um (``binds_um``): it does not matter from which distance below that it
 is tested.
+
+*A weld.* Two equal aggregates that face each other in a pore of twice the width join like one that touches the plane of
+symmetry between them, without friction. The film between them is twice the gap to the plane, so the gap has half of the
+film and half of the tangent.
 
 *A bonded wall* keeps its points in place. Within about (theta - 1)^(5/2) R / 30 of its edge the strain is of order one
 and the free surface turns over to the wall. The rule would close the wedge there, which this script leaves out: the
@@ -81,13 +85,13 @@ SIZE, AT_LINES = 0.2, 1e-4
 #: Elements at the edge of a bonded wall, over the radius, for theta = 1 + BONDED_GROWTH. They are larger for a larger
 #: theta, because Newton's method finds no equilibrium if they resolve the zone where the surface turns over.
 AT_BONDED, BONDED_GROWTH = 1e-3, 0.05
-#: Width of the pore, least film (um), and tangent of the least angle (Table 1).
-WIDTH, FILM, SLOPE = 50.0, 2.0, math.tan(math.radians(16.7))
+#: Width of the pore, or of its half with a plane of symmetry (um).
+WIDTH = 50.0
 #: Length of the means over the width.
 LENGTH = 1 / 20
-#: Radius of the seed that grows into the upper wall (um), its thetas, and first guesses of the angle (rad) of its
-#: contact line. The film closes at theta = (48 / 5)^2 = 92.16.
-SEED, TOUCHING = 5.0, {94.0: 1.3, 102.0: 1.2, 120.0: 1.0, 148.0: 0.9}
+#: Radius of the seed that grows into the upper wall, or into a plane (um), its thetas, and first guesses of the angle
+#: (rad) of its contact line. The film closes at theta = (48 / 5)^2 = 92.16, that at the plane at (49 / 5)^2 = 96.04.
+SEED, TOUCHING, WELDED = 5.0, {94.0: 1.3, 102.0: 1.2, 120.0: 1.0, 148.0: 0.9}, {98.0: 1.3, 106.0: 1.2, 122.0: 1.0}
 #: Radii (um) of bonded half-discs, and their thetas.
 BONDED = (5.0, 1.05), (20.0, 1.05), (45.0, 1.05), (20.0, 1.1), (20.0, 1.15)
 #: The first part of theta and of prescribed positions, and the growth of parts from one equilibrium to the next.
@@ -109,6 +113,18 @@ PER_EDGE, APART = 40, 0.002
 PARTS, BESIDE = 32, 0.05
 #: Order of the quadrature of means.
 QUADRATURE = 20
+
+
+class Rule(NamedTuple):
+    """The rule for contact (2.3.3): least film (um), and tangent of the least angle."""
+
+    film: float
+    slope: float
+
+
+#: Those of Table 1, and half of them at a plane of symmetry.
+AT_WALL = Rule(2.0, math.tan(math.radians(16.7)))
+AT_PLANE = Rule(*(part / 2 for part in AT_WALL))
 
 
 class Surface(NamedTuple):
@@ -241,17 +257,18 @@ class Body:
         places = self.position(self._on(part, np.linspace(0, 1, PER_EDGE + 1)))
         return places[np.argsort(places[:, 0], kind="stable")]
 
-    def clearance(self) -> tuple[float, float]:
+    def clearance(self, rule: Rule) -> tuple[float, float]:
         """The least value of gap / min(film, slope d) - 1 over distances d from the contact line, and the d (um) where
         it is. The smallest d is 1e-5 um."""
         free = self.shape("free")
         line = free[0, 0] if self.first is None else self.shape("top")[-1, 0]
         free = free[free[:, 1] > WIDTH / 2]
-        distance = np.unique(np.concatenate([np.geomspace(1e-5, 1, 2000), np.arange(1, 8, APART), [FILM / SLOPE],
+        distance = np.unique(np.concatenate([np.geomspace(1e-5, 1, 2000), np.arange(1, 8, APART),
+                                             [rule.film / rule.slope],
                                              free[:, 0] - line]))
         distance = distance[(distance > 0) & (distance <= free[-1, 0] - line)]
         gap = WIDTH - np.interp(distance, free[:, 0] - line, free[:, 1])
-        ratio = gap / np.minimum(FILM, SLOPE * distance) - 1
+        ratio = gap / np.minimum(rule.film, rule.slope * distance) - 1
         return float(ratio.min()), float(distance[ratio.argmin()])
 
     def surface(self, wall: str) -> Surface:
@@ -353,8 +370,11 @@ def _geometry(radius: float, size: float, line: float | None, smallest: float) -
     return OCCGeometry(face, dim=2)
 
 
-def touching(theta: float, size: float, guess: float) -> tuple[dict[str, float], float]:
-    """The numbers of the seed that grows into the upper wall, and the angle of its contact line; guess: of it."""
+def touching(theta: float, size: float, guess: float, rule: Rule) -> tuple[dict[str, float], float]:
+    """The numbers of the seed that grows into the upper wall, or into a plane, and the angle of its contact line.
+
+    guess: of this angle.
+    """
     body, trials = None, []
     while not trials or abs(trials[-1][1]) > CLOSE:
         if len(trials) < 2:
@@ -365,12 +385,12 @@ def touching(theta: float, size: float, guess: float) -> tuple[dict[str, float],
         if body is None or abs(angle - body.first) > 2 * LONGEST_TURN:
             body = Body(SEED, theta, size, angle)
         body.turn(angle)
-        trials.append((angle, body.clearance()[0]))
+        trials.append((angle, body.clearance(rule)[0]))
     top = body.shape("top")[:, 0]
     tensile, place = body.tensile_stress()
     traction, middle = max(body.surface(wall).largest_mean() for wall in ("bottom", "top"))
     return {"length_um": 2 * top.max(), "tip_um": body.shape("free")[:, 0].max(), "wall_traction": traction,
-            "tensile_stress": tensile, "binds_um": body.clearance()[1], "traction_x_um": abs(middle),
+            "tensile_stress": tensile, "binds_um": body.clearance(rule)[1], "traction_x_um": abs(middle),
             "tensile_x_um": place[0], "tensile_y_um": place[1], "unknowns": body.space.ndof}, trials[-1][0]
 
 
@@ -392,12 +412,13 @@ def judged(coarse: dict[str, float], fine: dict[str, float]) -> dict[str, dict[s
 
 def main() -> None:
     """Write the numbers and the bars of every state."""
-    numbers: dict[str, list] = {"touching": [], "bonded": []}
-    for theta, guess in TOUCHING.items():
-        coarse, angle = touching(theta, SIZE, guess)
-        fine, _ = touching(theta, SIZE / 2, angle)
-        numbers["touching"].append({"radius_um": SEED, "width_um": WIDTH, "theta": theta, **judged(coarse, fine)})
-        print(json.dumps(numbers["touching"][-1]), flush=True)
+    numbers: dict[str, list] = {"touching": [], "bonded": [], "welded": []}
+    for kind, states, rule in (("touching", TOUCHING, AT_WALL), ("welded", WELDED, AT_PLANE)):
+        for theta, guess in states.items():
+            coarse, angle = touching(theta, SIZE, guess, rule)
+            fine, _ = touching(theta, SIZE / 2, angle, rule)
+            numbers[kind].append({"radius_um": SEED, "width_um": WIDTH, "theta": theta, **judged(coarse, fine)})
+            print(json.dumps(numbers[kind][-1]), flush=True)
     for radius, theta in BONDED:
         fine = judged(bonded(radius, theta, SIZE), bonded(radius, theta, SIZE / 2))
         numbers["bonded"].append({"radius_um": radius, "width_um": WIDTH, "theta": theta, **fine})
