@@ -2,9 +2,9 @@
 side, and scenes without a weld. The case coupling-weld follows the mirror image further, and `test_longer.py` resumes a
 run with a weld."""
 
+import re
 from dataclasses import replace
 from functools import cache
-import re
 
 import numpy as np
 import pytest
