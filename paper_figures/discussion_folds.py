@@ -67,7 +67,7 @@ def _places(rows: list[dict], verdict: str) -> np.ndarray:
 
 def _verdict(row: dict) -> str:
     """The recorded verdict; `BEFORE_CONTACT` if the run reaches its end without contact, and may fold later."""
-    return BEFORE_CONTACT if row["verdict"] == family.ARRIVES and not row["contact"] else row["verdict"]
+    return BEFORE_CONTACT if family.ends_before_contact(row) else row["verdict"]
 
 
 def caption() -> str:

@@ -126,9 +126,9 @@ class Erosion:
         return remeshing.within(self.remeshing, pore, receded, speed)
 
     def rate(self, pore: Pore, number: int, water: Flow | None) -> float:
-        """um2 mg/L/h, biomass of the density X_m that the aggregate with index ``number`` loses.
+        """Biomass (um2 mg/L/h) that an aggregate loses, at the density X_m.
 
-        water: the flow in ``pore``, None without [flow].
+        number: the aggregate's index; water: the flow in ``pore``, None without [flow].
         """
         outline = pore.outlines[number]
 

@@ -44,9 +44,9 @@ from repro.model.remeshing import Remeshing
 from repro.model.solid import Shape, Solid
 from repro.model.support import Support
 
-#: Arcs in which a weld ends are halved until a part is shorter than the arc times this times
-#: numerics.tolerance: to a sixteenth in ``fast``, where lengths then err by 0.8 % or less
-#: (``coupling-weld``; up to 1.4 % with an eighth).
+#: The last arc of a weld is halved until a part is shorter than this times numerics.tolerance of
+#: the arc: a sixteenth in ``fast``. Lengths then err by 0.8 % or less, and by up to 1.4 % with an
+#: eighth (``coupling-weld``).
 ARC_PART = 10.0
 
 
@@ -84,8 +84,8 @@ class Notch:
     positions in the old shape; size: number of nodes from corner to corner; film: least film (um);
     slope: tangent of the least angle; joined: number of pairs of corners beyond the old line that
     have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
-    thin; first_enough: smallest number for which no film is too thin; step: largest number by which
-    the next trial has fewer pairs.
+    thin; first_enough: smallest number for which no film is too thin; step: the next trial has
+    at most this many pairs fewer.
     """
 
     pairs: np.ndarray

@@ -12,13 +12,13 @@ import numpy as np
 
 from reference import gold_flow
 from repro.march.simulation import simulate
-from repro.results import M_PER_D
 from repro.runs.machine import source_hash
 from repro.scene import load_scene
 from verification.bench.record import clock, measured, reference_of
 from verification.bench.runs import BY_MINUTES, PRESET_PAPER
 from verification.claims.levels import converged
 from verification.claims.runs import until
+from verification.problems.hard import clean_conductivity
 from verification.problems.runs import QUADRATIC, after_contact
 
 #: Times of the numbers (h), and that of the diagram.
@@ -97,6 +97,6 @@ def reference() -> dict:
 def gold_conductivities() -> np.ndarray:
     """Conductivities (m/day) of NGSolve at TIMES."""
     scene = load_scene("wide")
-    clean = scene.flow.gravity * scene.pore.width**2 / (12 * scene.flow.kinematic_viscosity)
+    clean = clean_conductivity(scene)
     added = [gold_flow.added(f"wide, {time:g} h", "laplacian").length for time in TIMES]
-    return np.array([clean * M_PER_D / (1 + length / scene.pore.length) for length in added])
+    return np.array([clean / (1 + length / scene.pore.length) for length in added])

@@ -21,7 +21,7 @@ from repro.network.resistance import share_range
 from repro.network.throats import added_resistance
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, claim
-from verification.claims.base_run import upstream_means
+from verification.claims.base_run import DISTANCES, upstream_means
 from verification.claims.levels import ABOUT_WIDE, PAIRED
 from verification.claims.permeability import CLOSING, LENGTHS, at_length, clean, layered_share
 from verification.claims.runs import (
@@ -104,7 +104,7 @@ def depends_on_the_sink() -> Finding:
 
 
 #: Distance (um) upstream of the aggregate at which the paper names a concentration (C05).
-AWAY = 60.0
+AWAY = DISTANCES[0]
 
 
 @claim("C47", "4", "the aggregate enhances its transport, which shows how difficult it is to set a mass transfer "

@@ -93,7 +93,7 @@ def _drawn() -> str:
     for drive in family.DRIVES:
         driven = [row for row in rows if row["drive"] == drive]
         folds = sum(row["verdict"] == family.FOLD for row in driven)
-        early = sum(row["verdict"] == family.ARRIVES and not row["contact"] for row in driven)
+        early = sum(map(family.ends_before_contact, driven))
         counts.append(f"{folds} of {len(driven)} ({drive}), where {early} runs end before contact")
     return (f"Of the pores drawn at random these fold: {'; '.join(counts)}. A run ends at three times the contact time "
             "of an aggregate that has the supply everywhere, so a longer run may fold.")

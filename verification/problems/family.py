@@ -114,6 +114,11 @@ def earliest_contact(scene: Scene) -> float | None:
     return None
 
 
+def ends_before_contact(row: dict) -> bool:
+    """Does a run reach its end without contact with the opposite wall? A longer run may fold."""
+    return row["verdict"] == ARRIVES and not row["contact"]
+
+
 def draw_member(number: int) -> Member:
     """The member with a number. It does not depend on the other members."""
     draw = np.random.default_rng([SEED, number])
