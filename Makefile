@@ -20,6 +20,8 @@ SLOW := -o faulthandler_timeout=3600
 # The linear algebra is sparse: threads in the dense kernels only slow it down.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
+# Tests, cases and mutants start hundreds of processes. Python keeps the compiled modules for the next one.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help env figures check-manifest claims sensitivity validation verify verify-fast mutants mutants-sampled test test-thorough oldest lint bench crate network gold docs clean

@@ -85,7 +85,7 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
         strained = mesh.strained_arcs()
         if not any(arcs.any() for arcs in strained):
             break
-        outlines = [sizes_of.halved(outline, arcs) if arcs.any() else outline
+        outlines = [sizes_of.cut(outline, [(arc, 0.5) for arc in np.flatnonzero(arcs).tolist()])
                     for outline, arcs in zip(outlines, strained)]
     return mesh.checked(), outlines
 

@@ -16,7 +16,7 @@ from repro.fem import elements
 from repro.fem.elements import Table
 from repro.fem.mesh import Mesh, curved
 from repro.fem.outline import Outline
-from repro.fem.sizing import SPLIT, placed
+from repro.fem.sizing import SPLIT, with_corners
 from repro.fem.transfer import Located
 
 #: A point lies on a wall or an end if it is nearer than this times the width. Points on the unit
@@ -148,9 +148,7 @@ def refined(mesh: Mesh, outlines: Sequence[Outline],
     for outline, loop in zip(outlines, mesh.straight.topology.loops):
         corners, arc, t = _along(parts, loop)
         loops.append(corners)
-        if mesh.geometry == 2:
-            arc, t = np.repeat(arc, 2), _with_middles(t)
-        finer.append(placed(outline, arc, t))
+        finer.append(with_corners(outline, arc, t))
     return Bisection(mesh, _meshed(mesh, parts, tuple(loops), finer), finer, parts.owner,
                      parts.local)
 
@@ -229,12 +227,6 @@ def _along(parts: _Parts, loop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
         walk(a, b, edge, 0.0, 1.0)
     corners, edges, t = zip(*found)
     return np.array(corners), np.array(edges), np.array(t)
-
-
-def _with_middles(t: np.ndarray) -> np.ndarray:
-    """(2 K,) t on edges: each of t (K,), and the middle between it and the next one."""
-    after = np.append(t[1:], 0.0)
-    return np.column_stack([t, 0.5 * (t + np.where(after > t, after, 1.0))]).ravel()
 
 
 def _meshed(mesh: Mesh, parts: _Parts, loops: tuple[np.ndarray, ...],

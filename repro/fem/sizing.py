@@ -236,12 +236,26 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
                   sizing.middle(outline))
 
 
-def halved(outline: Outline, cut: np.ndarray) -> Outline:
-    """The same curve with some of its arcs, ``cut`` (arcs,), cut at their middles."""
-    parts = np.where(cut, 4, 2)
-    arc = np.repeat(np.arange(len(cut)), parts)
-    first = np.cumsum(parts) - parts
-    return placed(outline, arc, (np.arange(len(arc)) - first[arc]) / parts[arc])
+def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
+    """The same curve with further corners; places: (edge, t) with t in (0, 1)."""
+    if not places:
+        return outline
+    edges = len(outline.points) // outline.geometry
+    edge, t = zip(*sorted([*((edge, 0.0) for edge in range(edges)), *places]))
+    return with_corners(outline, np.array(edge), np.array(t))
+
+
+def with_corners(outline: Outline, edge: np.ndarray, t: np.ndarray) -> Outline:
+    """The same curve with corners (K,), each at t in [0, 1) of an edge, and with the middles of its
+    arcs.
+
+    edge: (K,) numbers of edges, ascending. Each edge begins with a corner, at t = 0.
+    """
+    if outline.geometry == 2:
+        after = np.append(t[1:], 0.0)
+        middles = 0.5 * (t + np.where(after > t, after, 1.0))
+        edge, t = np.repeat(edge, 2), np.column_stack([t, middles]).ravel()
+    return placed(outline, edge, t)
 
 
 def runs(outline: Outline) -> list[tuple[int, int]]:

@@ -18,7 +18,7 @@ import numpy as np
 from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
 from repro.fem.outline import ON_ARC, Outline, area_beside_chord, parabola
-from repro.fem.sizing import Sizing, placed
+from repro.fem.sizing import Sizing, cut, placed
 from repro.fem.walls import FREE, WELD
 
 #: Corners of the two surfaces are opposite if their arc lengths from the line differ by at most
@@ -308,21 +308,6 @@ def _places(outline: Outline, walk: np.ndarray, s: np.ndarray) -> list[tuple[int
     t, k = np.modf(places)
     return [(int(corners[each]), part) if forward else (int(corners[each] - 1) % arcs, 1 - part)
             for each, part in zip(k.astype(int), t.tolist())]
-
-
-def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
-    """The same curve with further corners; places: (edge, t) with t in (0, 1)."""
-    if not places:
-        return outline
-    edges = len(outline.points) // outline.geometry
-    at: list[list[float]] = [[0.0] for _ in range(edges)]
-    for edge, t in sorted(places):
-        at[edge].append(t)
-    parts = [np.array(each) for each in at]
-    if outline.geometry == 2:
-        parts = [np.column_stack([t, (t + np.append(t[1:], 1.0)) / 2]).ravel() for t in parts]
-    every = np.repeat(np.arange(edges), [len(t) for t in parts])
-    return placed(outline, every, np.concatenate(parts))
 
 
 def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:

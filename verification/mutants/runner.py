@@ -46,7 +46,7 @@ RECORD = REPORT / "mutants.json"
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: The beginning of the report of a failed fixture.
 IN_FIXTURE = re.compile(r'^failed on (setup|teardown) with "')
-NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache",
+NOT_COPIED = (".git", ".venv", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache",
               ".writing-*")
 #: Largest duration (s) of a trial. No case takes a tenth of it, but a mutant may run forever.
 LONGEST = 600.0
