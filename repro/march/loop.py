@@ -136,7 +136,8 @@ def _grow(course: Course, state: RestartState,
     """Yield the state after every step from ``state`` on; solved: solution in ``state``."""
     stages = course.stages
     pore = replace(state.pore, concentrations=solved.concentrations)
-    event = nearest_end(course.ends, pore, solved)
+    with stopping(pore.time, stages.growth.bonded), folding(state.compression, state.time):
+        event = nearest_end(course.ends, pore, solved)
     shown = pore.mesh.topology
     while event.margin <= 0 and stages.growth.end - pore.time > SAME_TIME:
         try:
