@@ -491,7 +491,7 @@ class Mesh:
     @property
     def poor(self) -> int:
         """Number of triangles with a quality below POOR."""
-        return np.count_nonzero(self.quality < POOR)
+        return int(np.count_nonzero(self.quality < POOR))
 
     def acceptable(self, poor: int = 0) -> bool:
         """Does the mesh meet the paper's criterion (3.5), and is no triangle turned over?

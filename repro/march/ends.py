@@ -403,9 +403,9 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
     -------
     Reached
         The step to the event. Its margin is positive and at most CLOSE, unless the margin jumps
-        there. If the margin falls between two trials, the difference is an error of the trials'
-        meshes, and a margin up to this error ends the search. If a shorter step fails, the result is the shortest step that has passed the event,
-        and the message says so.
+        there. If the margin falls from one trial to a later time, the meshes of the trials differ,
+        and the fall is an error: a margin up to the largest fall ends the search. If a shorter step
+        fails, the result is the shortest step that has passed the event, and the message says so.
     """
     low, high = margin - CLOSE / 2, passed.event.margin - CLOSE / 2
     side = 0

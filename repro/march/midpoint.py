@@ -80,8 +80,8 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
 
     The step succeeds if the rates change by at most ``largest_change`` (1/h) over its first half.
     known: meshes that other steps from the same start have generated. One of them replaces a new
-    mesh at the end, if possible. Raises StageError if a stage fails, and RunEnd if the step passes an end of the pore or if
-    aggregates overlap.
+    mesh at the end, if possible. Raises StageError if a stage fails, and RunEnd if the step passes
+    an end of the pore or if aggregates overlap.
     """
     first = stages.rates(previous, solved)
     try:
