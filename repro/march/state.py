@@ -16,11 +16,11 @@ from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
 from repro.model.body import Body
 from repro.model.pore import Pore
-from repro.model.remeshing import GeneratedMesh
 from repro.model.solving import Solved
 
 if TYPE_CHECKING:
     from repro.march.balance import Ledger
+    from repro.model.remeshing import GeneratedMesh
 
 
 class Dataclass(Protocol):
