@@ -8,11 +8,12 @@ import json
 import numpy as np
 import pytest
 
+import repro
 from repro.errors import GrowthError, SimulationError
 from repro.fem import elements
 from repro.model import adhesion, contact, remeshing
 from repro.model.finer_lines import with_finer_lines
-from repro.model.mechanics import Mechanics
+from repro.model.mechanics import Mechanics, equilibrium
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
 from repro.runs.execution import run
@@ -53,6 +54,29 @@ def test_stresses_without_an_equilibrium_end_a_run_with_its_time(tmp_path, monke
     with pytest.raises(SimulationError, match="t = 0 h, in growth: there is no equilibrium"):
         run(load_scene("base", ["numerics.preset=fast", "growth.bonding_strength=1 GPa"]), tmp_path / "run")
     assert json.loads((tmp_path / "run" / "run.json").read_text())["status"].startswith("failed: ")
+
+
+@pytest.mark.parametrize("failing, starts", [(1, ("pore", "pore", "rest")), (2, ("pore", "pore", "pore"))])
+def test_stresses_start_from_the_equilibrium_without_forces_if_newton_fails(monkeypatch, failing, starts):
+    """The first attempt under the forces of the water fails, or that and the equilibrium without them."""
+    soft = ("numerics.preset=fast", "growth.fluid_forces=included", "growth.shear_modulus=1e-3 MPa")
+    scene = load_scene("base", soft)
+    report = next(repro.simulate(scene))
+    loading = adhesion.Loading.of(scene)
+    expected = adhesion.wall_peak(loading, report.pore, report.solved).value
+    calls = []
+
+    def counted(mechanics, grown, start, forces, patient=True):
+        calls.append(("pore" if start is grown else "rest", forces is not None, patient))
+        if len(calls) <= failing:
+            raise GrowthError("stands")
+        return equilibrium(mechanics, grown, start, forces, patient=patient)
+
+    monkeypatch.setattr(adhesion, "equilibrium", counted)
+    for cached in (adhesion.at_rest, adhesion.wall_peaks):
+        cached.cache_clear()
+    assert adhesion.wall_peak(loading, report.pore, report.solved).value == pytest.approx(expected, rel=1e-8)
+    assert calls == list(zip(starts, (True, False, True), (False, False, True)))
 
 
 def test_theta_of_parts_stays_positive_and_keeps_its_sum():

@@ -11,6 +11,7 @@ import repro
 from repro import results
 from repro.errors import GrowthError, RunEnd
 from repro.fem.sizing import ACROSS_PORE
+from repro.march import loop
 from repro.march.ends import CLOSE, Event, Reached, Strength, _detachment, locate
 from repro.march.folding import fold_message, most_compressed
 from repro.march.state import Compression
@@ -167,6 +168,39 @@ def test_an_event_is_located_from_its_function(margin, zero):
 
     event = locate(reach, 0.0, margin(0.0), reached(margin)(5.0))
     assert event.event.margin > 0 and event.time == pytest.approx(zero, rel=1e-4, abs=2e-7) and len(times) <= 40
+
+
+@pytest.mark.parametrize("margins", [(-0.02, 0.04, -0.05, 0.02), (0.01, -0.02, 0.05, 0.03)])
+def test_a_margin_that_falls_between_trials_errs_by_the_fall(margins):
+    """It falls by 0.03 before the event, or by 0.04 after it. The first margin up to this error ends the search."""
+    left = list(margins)
+    event = locate(lambda time: reached(lambda _: left.pop(0) if left else CLOSE / 2)(time), 0.0, -1.0,
+                   reached(lambda t: t / 2 - 1)(5.0))
+    assert event.event.margin == margins[-1]
+
+
+#: Two bonded seeds. In an acute corner of the water each mesh has more poor triangles than a moved mesh may have.
+ACUTE = ("numerics.preset=fast", "pore.width=50 um", "pore.length=1200 um", "flow.mean_velocity=10 m/day",
+         "growth.wall=bonded", "growth.bonding_strength=6 kPa", 'growth.end="20 h"', 'output.times=["20 h"]',
+         *(f"substrates.{name}.supply=0.85 mg/L" for name in ("acceptor", "donor")),
+         'aggregate=[{radius="5.7 um", position="-79.7 um", wall="upper"}, {radius="5.5 um", position="-91.3 um"}]')
+
+
+def test_trials_share_a_mesh(monkeypatch):
+    """Margins on one mesh are smooth. The search needs few trials, as for a function, and ends within CLOSE."""
+    trials = []
+
+    def counted(reach, start, margin, passed):
+        def noted(time):
+            trials.append(reach(time))
+            return trials[-1]
+        return locate(noted, start, margin, passed)
+
+    monkeypatch.setattr(loop, "locate", counted)
+    with pytest.raises(repro.Detachment):
+        list(repro.simulate(load_scene("wide", ACUTE)))
+    assert trials[0].step.remeshed and 0 < trials[-1].event.margin <= CLOSE and len(trials) <= 8
+    assert trials[-1].step.pore.mesh.topology is trials[-2].step.pore.mesh.topology
 
 
 @pytest.mark.parametrize("error", [GrowthError("no rest"), FloatingPointError("overflow"), repro.PoreEnd("outside")])

@@ -488,9 +488,17 @@ class Mesh:
             raise MeshError(f"a triangle near x = {x:.4g}, y = {y:.4g} um is turned over")
         return self
 
-    def acceptable(self) -> bool:
-        """Does the mesh meet the paper's criterion (3.5), and is no triangle turned over?"""
-        straight = self.areas.min() > 0 and np.count_nonzero(self.quality < POOR) <= POOR_ALLOWED
+    @property
+    def poor(self) -> int:
+        """Number of triangles with a quality below POOR."""
+        return int(np.count_nonzero(self.quality < POOR))
+
+    def acceptable(self, poor: int = 0) -> bool:
+        """Does the mesh meet the paper's criterion (3.5), and is no triangle turned over?
+
+        poor: number of poor triangles to allow, if it is larger than POOR_ALLOWED.
+        """
+        straight = self.areas.min() > 0 and self.poor <= max(poor, POOR_ALLOWED)
         return bool(straight) and not self.turned_over(self.topology.bent).any()
 
 

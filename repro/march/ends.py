@@ -403,12 +403,15 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
     -------
     Reached
         The step to the event. Its margin is positive and at most CLOSE, unless the margin jumps
-        there. If a shorter step fails, the result is the shortest step that has passed the event,
-        and the message says so.
+        there. If the margin falls from one trial to a later time, the meshes of the trials differ,
+        and the fall is an error: a margin up to the largest fall ends the search. If a shorter step
+        fails, the result is the shortest step that has passed the event, and the message says so.
     """
     low, high = margin - CLOSE / 2, passed.event.margin - CLOSE / 2
     side = 0
-    while passed.event.margin > CLOSE:
+    close = CLOSE
+    below, above = -inf, inf  # margins of the trials that are nearest to the event
+    while passed.event.margin > close:
         interval = passed.time - start
         if interval <= max(SAME_MOMENT * passed.time, SHORTEST_MOMENT):
             break
@@ -417,13 +420,15 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
             trial = reach(start + part * interval)
         except (RunEnd, StageError, FloatingPointError) as error:
             return passed.unlocated(start, error)
-        value = trial.event.margin - CLOSE / 2
-        if trial.event.margin > 0:
-            passed, high = trial, value
+        found = trial.event.margin
+        value = found - CLOSE / 2
+        close = max(close, below - found, found - above)
+        if found > 0:
+            passed, high, above = trial, value, found
             low *= 0.5 if side > 0 else 1.0
             side = 1
         else:
-            start, low = trial.time, value
+            start, low, below = trial.time, value, found
             high *= 0.5 if side < 0 else 1.0
             side = -1
     return passed

@@ -57,15 +57,15 @@ class Stepping:
     solution after it and the step control of the next step. The length of the step does not depend
     on ``growth.end`` or on the requested rows. A step that passes ``growth.end`` is cut there. At a
     jump of the scene's tables the solution is that before the jump.
-    cut(stages, pore, solved, time): makes a shorter step to a time (h). Returns its StepResult and
-    the solution after it.
+    cut(stages, pore, solved, time, known): makes a shorter step to a time (h), as
+    :func:`midpoint.attempt`. Returns its StepResult and the solution after it.
     rows(growth): times (h) of rows without ``output.times``, besides the ends of steps.
     first: length of the first attempted step, as a multiple of growth.time_step.
     ends(scene): times (h) at which steps end, if known in advance.
     """
 
     advance: Callable[[Stages, Pore, Solved, StepControl], tuple[StepResult, Solved, StepControl]]
-    cut: Callable[[Stages, Pore, Solved, float], tuple[StepResult, Solved]]
+    cut: Callable[..., tuple[StepResult, Solved]]
     rows: Callable[[Growth], tuple[float, ...]] = lambda _: ()
     first: float = 1.0
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
@@ -136,7 +136,8 @@ def _grow(course: Course, state: RestartState,
     """Yield the state after every step from ``state`` on; solved: solution in ``state``."""
     stages = course.stages
     pore = replace(state.pore, concentrations=solved.concentrations)
-    event = nearest_end(course.ends, pore, solved)
+    with stopping(pore.time, stages.growth.bonded), folding(state.compression, state.time):
+        event = nearest_end(course.ends, pore, solved)
     shown = pore.mesh.topology
     while event.margin <= 0 and stages.growth.end - pore.time > SAME_TIME:
         try:
@@ -196,8 +197,14 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
     step, after, control = stepping.advance(stages, pore, solved, state.step_control)
     end = reached(step, after)
     if end.event.margin > 0:
-        end = locate(lambda time: reached(*stepping.cut(stages, pore, solved, time)), pore.time,
-                     margin, end)
+        trial = step
+
+        def shorter(time: float) -> Reached:
+            nonlocal trial
+            trial, after = stepping.cut(stages, pore, solved, time, trial.generated)
+            return reached(trial, after)
+
+        end = locate(shorter, pore.time, margin, end)
         end = replace(end, step=replace(end.step, within=step.within))
     elif stages.tables.jumps(step.pore.time):
         end = reached(*_after_jump(stages, step, after))

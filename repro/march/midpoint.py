@@ -74,12 +74,14 @@ class Halfway:
 
 
 def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
-            largest_change: float = np.inf, search: SearchOptions = PATIENT) -> Attempt:
+            largest_change: float = np.inf, search: SearchOptions = PATIENT,
+            known: tuple[GeneratedMesh, ...] = ()) -> Attempt:
     """Attempt a step of ``duration`` (h).
 
     The step succeeds if the rates change by at most ``largest_change`` (1/h) over its first half.
-    Raises StageError if a stage fails, and RunEnd if the step passes an end of the pore or if
-    aggregates overlap.
+    known: meshes that other steps from the same start have generated. One of them replaces a new
+    mesh at the end, if possible. Raises StageError if a stage fails, and RunEnd if the step passes
+    an end of the pore or if aggregates overlap.
     """
     first = stages.rates(previous, solved)
     try:
@@ -100,7 +102,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     refuse_outside(stages.channel, previous, expanded)
     refuse_fold(expanded)
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
-    new, remeshed = stages.new_mesh(previous, expanded, solved)
+    new, remeshed = stages.new_mesh(previous, expanded, solved, known)
     generated = (GeneratedMesh(expanded, new),) if remeshed else ()
     refuse_density(previous, new, stages.remeshing.maximum_density)
     makes_contact = expanded.spanning > previous.spanning
@@ -110,7 +112,8 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
                     after.mass - previous.mass, new.mass, flows.unmet)
     complete = replace(half, generated=half.generated + generated, end=expansion)
     inner = partial(interpolate, stages, previous, solved, complete)
-    step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner)
+    step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner,
+                      generated=generated + known)
     return Attempt(step, change, expansion.gaps if makes_contact else None)
 
 
@@ -178,8 +181,7 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
                 time: float) -> InterpolatedState:
     """Advance the pore to a time (h) within a step with interpolated rates, and solve there.
 
-    If the moved mesh is not acceptable, one of the meshes that the step has generated replaces it,
-    the nearest in time first.
+    If the moved mesh is not acceptable, one of the meshes that the step has generated replaces it.
     """
     part = (time - previous.time) / half.duration
     mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,
@@ -187,8 +189,7 @@ def interpolate(stages: Stages, previous: Pore, solved: Solved, half: Halfway,
     after = replace(grow(previous, mean, part * half.duration), time=time)
     expanded = _expand(stages, previous, after, half, part, PATIENT).pore
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, part))
-    nearest = sorted(half.generated, key=lambda each: abs(each.shape.time - time))
-    inner, _ = stages.new_mesh(previous, expanded, solved, nearest)
+    inner, _ = stages.new_mesh(previous, expanded, solved, half.generated)
     return InterpolatedState(*stages.grading.solve(inner))
 
 

@@ -20,6 +20,7 @@ from repro.model.solving import Solved
 
 if TYPE_CHECKING:
     from repro.march.balance import Ledger
+    from repro.model.remeshing import GeneratedMesh
 
 
 class Dataclass(Protocol):
@@ -86,7 +87,8 @@ class StepResult:
 
     pore: at the end; before: pore and solution after growth and before the expansion; ledger: mass
     balance; remeshed: does the step make a new mesh?; iterations: of Newton's method; within:
-    interpolates the state to a time (h) within the step; departed: as :attr:`Report.departed`.
+    interpolates the state to a time (h) within the step; departed: as :attr:`Report.departed`;
+    generated: meshes for shorter steps from the same start (:func:`remeshing.new_mesh`).
     """
 
     pore: Pore
@@ -96,6 +98,7 @@ class StepResult:
     iterations: int
     within: Callable[[float], InterpolatedState]
     departed: tuple[str, ...] = ()
+    generated: tuple[GeneratedMesh, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,9 @@ from repro.march.step_control import (
     fit_to_interval,
     next_step_size,
 )
-from repro.model.contact_lines import SearchOptions
+from repro.model.contact_lines import PATIENT, SearchOptions
 from repro.model.pore import Pore
+from repro.model.remeshing import GeneratedMesh
 from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.scene import Growth, needed
@@ -97,12 +98,12 @@ def _attempt(stages: Stages, *arguments: Any) -> Attempt:
     return eroding.attempt(stages, *arguments)
 
 
-def _cut(stages: Stages, previous: Pore, solved: Solved,
-         time: float) -> tuple[StepResult, Solved]:
+def _cut(stages: Stages, previous: Pore, solved: Solved, time: float,
+         known: tuple[GeneratedMesh, ...] = ()) -> tuple[StepResult, Solved]:
     """Make a step to a time (h) before the end of a step that is accepted."""
     while True:
         try:
-            trial = _attempt(stages, previous, solved, time - previous.time)
+            trial = _attempt(stages, previous, solved, time - previous.time, np.inf, PATIENT, known)
             break
         except Unresolved:
             finer = _halve_elements(stages, previous)

@@ -21,6 +21,7 @@ from repro.march.step_control import StepControl
 from repro.model.contact_lines import FirstContact
 from repro.model.mechanics import Expansion
 from repro.model.pore import Pore
+from repro.model.remeshing import GeneratedMesh
 from repro.model.solving import Solved
 from repro.model.stages import Stages
 from repro.scene import Growth, Scene
@@ -73,10 +74,10 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
             time = (previous.time + time) / 2
 
 
-def _cut(stages: Stages, previous: Pore, solved: Solved,
-         time: float) -> tuple[StepResult, Solved]:
+def _cut(stages: Stages, previous: Pore, solved: Solved, time: float,
+         known: tuple[GeneratedMesh, ...] = ()) -> tuple[StepResult, Solved]:
     """Make a step to a time (h), and solve at its end, just before a jump of the tables there."""
-    advanced = step(stages, previous, solved, time - previous.time)
+    advanced = step(stages, previous, solved, time - previous.time, known)
     after = contiguous(replace(advanced.pore, time=time))
     solved = stages.solver.solve(before_jump(stages.tables, after))
     return replace(advanced, pore=after), solved
@@ -89,8 +90,10 @@ def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) ->
     return InterpolatedState(after, stages.solver.solve(after), shorter.before)
 
 
-def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> StepResult:
-    """Make one step of ``duration`` (h): biomass, shape, mesh."""
+def step(stages: Stages, previous: Pore, solved: Solved, duration: float,
+         known: tuple[GeneratedMesh, ...] = ()) -> StepResult:
+    """Make one step of ``duration`` (h): biomass, shape, mesh; known: as for
+    :func:`midpoint.attempt`."""
     within = partial(_interpolate, stages, previous, solved)
     solved = _solve_midway(stages, previous, solved, duration)
     grown, end, flows = stages.transport.make_biomass(previous, solved, duration)
@@ -100,11 +103,13 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float) -> Ste
     refuse_outside(stages.channel, previous, expanded)
     refuse_fold(expanded)
     expanded = replace(expanded, concentrations=end)
-    after, remeshed = stages.new_mesh(previous, expanded, solved)
+    after, remeshed = stages.new_mesh(previous, expanded, solved, known)
+    generated = (GeneratedMesh(expanded, after),) if remeshed else ()
     ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
                     grown.mass - previous.mass, after.mass, flows.unmet)
     last = replace(grown, time=previous.time + duration), replace(solved, concentrations=end)
-    return StepResult(after, last, ledger, remeshed, expansion.iterations, within)
+    return StepResult(after, last, ledger, remeshed, expansion.iterations, within,
+                      generated=generated + known)
 
 
 def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:

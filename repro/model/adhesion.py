@@ -26,11 +26,13 @@ growth alone.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
+from repro.errors import GrowthError
 from repro.fem import elements
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, edge_functions
@@ -212,8 +214,24 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
     for number, region in enumerate(rest.mesh.regions):
         seen = rest.focused(number)
         own = None if forces is None else rest.mesh.of_region(region, forces)
-        rest, _ = equilibrium(mechanics, seen, seen, own)
+        rest = _under_forces(mechanics, seen, own)
     return rest.focused(pore.focus), solved
+
+
+def _under_forces(mechanics: Mechanics, pore: Pore, forces: np.ndarray | None) -> Pore:
+    """Equilibrium of the aggregate in focus under nodal forces (n, 2), over mu_L.
+
+    A shape on a new mesh is not in equilibrium. If Newton's method fails to balance it under the
+    forces, it starts from the equilibrium without forces, if there is one.
+    """
+    start = pore
+    if forces is not None:
+        try:
+            return equilibrium(mechanics, pore, pore, forces, patient=False)[0]
+        except GrowthError:
+            with suppress(GrowthError):
+                start, _ = equilibrium(mechanics, pore, pore, None, patient=False)
+    return equilibrium(mechanics, pore, start, forces)[0]
 
 
 def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:

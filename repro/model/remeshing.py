@@ -80,8 +80,8 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     speed : float
         Mean velocity, um/h, for the substrates beyond the ends of the old mesh.
     generated : sequence of GeneratedMesh, optional
-        Meshes of the same step. The first one that is acceptable after it has moved with the
-        aggregates is used instead of a new mesh.
+        Meshes of steps from the same start. The nearest one in time that is acceptable after it has
+        moved with the aggregates is used instead of a new mesh.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
     mesh = moved_mesh(rules.meshing, previous, expanded)
     if mesh is not None:
         return replace(expanded, space=Space(mesh)), False
-    for generated_mesh in generated:
+    for generated_mesh in sorted(generated, key=lambda each: abs(each.shape.time - expanded.time)):
         pore = _on_generated(rules, generated_mesh, expanded)
         if pore is not None:
             return pore, True
@@ -109,7 +109,8 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     """Expanded aggregates on a mesh that the same step has generated for other shapes.
 
     The mesh moves with the material. Returns None if the contact differs or if the moved mesh is
-    not acceptable.
+    not acceptable. It may have as many poor triangles as the generated one: in an acute corner
+    of the water each mesh has some.
     """
     shape, start = generated.shape, generated.pore
     old = expanded.mesh
@@ -120,7 +121,7 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     for body, region in zip(start.bodies, start.mesh.regions):
         on_wall = region.loop[touches_wall(body.wall)]
         points[on_wall, 1] = start.mesh.points[on_wall, 1]
-    mesh = moved_mesh(rules.meshing, start, start.moved(points))
+    mesh = moved_mesh(rules.meshing, start, start.moved(points), start.mesh.poor)
     if mesh is None:
         return None
     target = replace(start, space=Space(mesh))
@@ -139,8 +140,9 @@ def _located_in(pore: Pore, mesh: Mesh) -> Located:
     return transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
 
 
-def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
-    """The mesh, moved with the aggregates; None if a new mesh is needed."""
+def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore, poor: int = 0) -> Mesh | None:
+    """The mesh, moved with the aggregates; None if a new mesh is needed; poor: as for
+    :meth:`Mesh.acceptable`."""
     mesh = previous.mesh
     length = meshing.channel.length
     if expanded.mesh.topology is not mesh.topology or not same_contact(expanded, previous):
@@ -150,7 +152,7 @@ def moved_mesh(meshing: Meshing, previous: Pore, expanded: Pore) -> Mesh | None:
                 or sizing.too_coarse(outline.corners, sizes)):
             return None
     moved = mesh_motion.moved(mesh, expanded.mesh.points[mesh.body])
-    return moved if moved.acceptable() else None
+    return moved if moved.acceptable(poor) else None
 
 
 def remesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,

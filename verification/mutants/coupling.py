@@ -131,13 +131,13 @@ MUTANTS = (
          "attempt",
          """start, at_start = stages.grading.solve(_erode(stages, previous, duration / 2, solved))
 start = replace(start, concentrations=at_start.concentrations)
-grown = midpoint.attempt(stages, start, at_start, duration, largest_change, search)
+grown = midpoint.attempt(stages, start, at_start, duration, largest_change, search, known)
 if grown.step is None:
     return grown
 end = _erode(stages, grown.step.pore, duration / 2, at_start)""",
          """start, at_start = stages.grading.solve(_erode(stages, previous, duration, solved))
 start = replace(start, concentrations=at_start.concentrations)
-grown = midpoint.attempt(stages, start, at_start, duration, largest_change, search)
+grown = midpoint.attempt(stages, start, at_start, duration, largest_change, search, known)
 if grown.step is None:
     return grown
 end = grown.step.pore"""),
@@ -367,6 +367,12 @@ end = grown.step.pore"""),
          f"{WELDS}a_welded_aggregate_at_the_wall_of_the_other_one_is_an_end")),
     *changes(
         "repro/march/loop.py",
+        ("trials-forget-meshes",
+         "Each trial of an event makes a new mesh.",
+         "_advance",
+         "stepping.cut(stages, pore, solved, time, trial.generated)",
+         "stepping.cut(stages, pore, solved, time)",
+         f"{ENDS}trials_share_a_mesh"),
         ("detached-mass-is-lost",
          "The mass of an aggregate that leaves the pore is in no ledger.",
          "_after_detachment",
@@ -375,6 +381,12 @@ end = grown.step.pore"""),
          f"{BODIES}an_aggregate_that_detaches_leaves_the_pore_with_its_mass[paper-quasi_steady]")),
     *changes(
         "repro/model/remeshing.py",
+        ("poor-meshes-of-a-step-are-made-anew",
+         "A mesh that a step has generated may have no more poor triangles than the paper allows.",
+         "_on_generated",
+         "moved_mesh(rules.meshing, start, start.moved(points), start.mesh.poor)",
+         "moved_mesh(rules.meshing, start, start.moved(points))",
+         f"{ENDS}trials_share_a_mesh"),
         ("other-triangles-move",
          "A mesh moves with an aggregate that has other triangles.",
          "moved_mesh",
@@ -657,6 +669,12 @@ end = grown.step.pore"""),
          "at_rest",
          "with_finer_lines(pore, lines, size, GRADATION)",
          "with_finer_lines(pore, lines, pore.mesh.width, GRADATION)"),
+        ("no-start-without-forces",
+         "Stresses under fluid forces need Newton's method to balance the carried shape.",
+         "_under_forces",
+         "start, _ = equilibrium(mechanics, pore, pore, None, patient=False)",
+         "equilibrium(mechanics, pore, pore, None, patient=False)",
+         "tests/test_detachment.py::test_stresses_start_from_the_equilibrium_without_forces_if_newton_fails"),
         ("tensile-stress-of-the-carried-shape",
          "The tensile stress is that of a shape that was carried to a new mesh.",
          "tensile_peaks",
@@ -1180,6 +1198,12 @@ end = grown.step.pore"""),
          "high *= 0.5 if side < 0 else 1.0",
          "high *= 1.0",
          f"{ENDS}an_event_is_located_from_its_function"),
+        ("falls-are-no-error",
+         "The search for an event goes on after the margin has fallen between two trials.",
+         "locate",
+         "close = max(close, below - found, found - above)",
+         "close = CLOSE",
+         f"{ENDS}a_margin_that_falls_between_trials_errs_by_the_fall"),
         ("short-steps-fail",
          "A shorter step that fails ends the run with an error.",
          "locate",
