@@ -115,16 +115,16 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
 
 
 def _with_line_speeds(new: Pore, previous: Pore, half: Halfway, end: Expansion) -> Pore:
-    """The pore with the speeds of contact lines in the second half of a step.
+    """The pore with the speeds of contact lines in both halves of a step.
 
     They are unknown after a first contact.
     """
-    later = {key: max(length - half.expansion.advances.get(key, 0.0), 0.0)
-             for key, length in end.advances.items()}
+    first = half.expansion.advances
+    second = {key: max(length - first.get(key, 0.0), 0.0) for key, length in end.advances.items()}
     bodies = []
     for number, (before, after) in enumerate(zip(previous.bodies, new.bodies)):
         makes_contact = after.spans and not before.spans
-        speeds = contact_lines.speeds(later, number, half.duration / 2)
+        speeds = contact_lines.speeds((first, second), number, half.duration / 2)
         bodies.append(replace(after, line_speeds=None if makes_contact else speeds))
     return replace(new, bodies=tuple(bodies))
 
@@ -134,26 +134,30 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
     """Equilibrium of the aggregates at a fraction ``part`` of the step.
 
     The search starts from the shapes known so far. Contact lines start at interpolated positions
-    and have small triangles there. At the end of the step, lines have gone on from their positions
-    half way at the speeds before the step, if these are known.
+    and have small triangles there. For the end of the step, lines are assumed to slow down after
+    the first half as in the last step.
     """
     shapes = _known_shapes(half, part)
-    halfway = half.expansion.advances
     advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
-                for key in halfway}
+                for key in half.expansion.advances}
     if half.end is None:
-        later = _advances_from(previous, half.duration / 2)
-        advances |= {key: halfway[key] + length for key, length in later.items() if key in halfway}
+        first, second = (_last_advances(previous, number, half.duration / 2) for number in (0, 1))
+        advances |= {key: length * (1 + second[key] / first[key])
+                     for key, length in half.expansion.advances.items()
+                     if second.get(key, np.inf) < first.get(key, 0.0)}
     search = replace(search, advances=advances,
                      line_size=stages.remeshing.meshing.sizes.moving_lines)
     return stages.expand(previous, after, _guess_shape(previous, shapes), search)
 
 
-def _advances_from(previous: Pore, duration: float) -> dict[tuple[int, int, int], float]:
-    """Advances (um) of the lines in a duration (h) at the speeds before the step, if known."""
+def _last_advances(previous: Pore, half: int,
+                   duration: float) -> dict[tuple[int, int, int], float]:
+    """Advances (um) of the lines in a duration (h) at their speeds in a half (0 or 1) of the last
+    step. Lines of unknown speeds are left out."""
     advances: dict[tuple[int, int, int], float] = {}
     for number, body in enumerate(previous.bodies):
-        advances |= contact_lines.advances_at(body.line_speeds, number, duration)
+        if body.line_speeds is not None:
+            advances |= contact_lines.advances_at(body.line_speeds[half], number, duration)
     return advances
 
 
@@ -166,7 +170,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
     of the mesh at the start.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
-    search = replace(search, advances=_advances_from(previous, duration / 2))
+    search = replace(search, advances=_last_advances(previous, 1, duration / 2))
     expansion = stages.expand(previous, ahead, _scale_shape(previous, ahead), search)
     shape = expansion.pore
     mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)

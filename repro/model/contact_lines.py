@@ -342,29 +342,29 @@ def point_at(outline: Outline, line: Line, length: float) -> np.ndarray:
     return parabola(np.array(advance - arc)) @ arcs[arc]
 
 
-def speeds(advances: Advances, number: int, duration: float) -> np.ndarray | None:
-    """(2, 2) um/h, speeds of an aggregate's lines by wall and direction.
+def speeds(advances: Sequence[Advances], number: int, duration: float) -> np.ndarray | None:
+    """(K, 2, 2) um/h, speeds of an aggregate's lines in K parts of a step, by wall and direction.
 
-    advances: um, in a duration (h). Returns None if all lines are on one wall.
+    advances: um, in each part; duration: h, of each part. Returns None if all lines are on one
+    wall.
     """
-    own = {key[1:]: length for key, length in advances.items() if key[0] == number}
-    walls = {wall for wall, _ in own}
+    keys = [key for key in advances[-1] if key[0] == number]
+    walls = {wall for _, wall, _ in keys}
     if len(walls) < 2:
         return None
-    by_line = np.zeros((max(walls), 2))
-    for (wall, direction), length in own.items():
-        by_line[wall - 1, (1 - direction) // 2] = length / duration
-    return by_line
+    by_line = np.zeros((len(advances), max(walls), 2))
+    for key in keys:
+        _, wall, direction = key
+        by_line[:, wall - 1, (1 - direction) // 2] = [part.get(key, 0.0) for part in advances]
+    return by_line / duration
 
 
-def advances_at(by_line: np.ndarray | None, number: int,
+def advances_at(by_line: np.ndarray, number: int,
                 duration: float) -> dict[tuple[int, int, int], float]:
     """{(number, wall, direction): um}, advances of an aggregate's lines in a duration (h).
 
-    by_line: as :func:`speeds` returns it.
+    by_line: (2, 2) um/h, speeds in one part of a step, as :func:`speeds` returns them.
     """
-    if by_line is None:
-        return {}
     return {(number, wall, direction): float(by_line[wall - 1, (1 - direction) // 2] * duration)
             for wall in range(1, len(by_line) + 1) for direction in (1, -1)}
 

@@ -226,6 +226,8 @@ class Coupled:
                   if not _fits(line, clearances[k], AT_REST)]
         within = [k for k in moving if self.placed.within_arc(self._lines[k])]
         near = iterate.defect < NEAR
+        if self.iterations == 0 and within:
+            return steps, change
         for k in moving:
             line = self._lines[k]
             if near and clearances[k] < 0 and _before_corner(line.advance):
@@ -296,7 +298,7 @@ def _leave_corner(line: Line, clearance: float, reach: float) -> float:
 
 def _before_corner(advance: float) -> bool:
     """Is an advance (arcs) at a corner or just before it?"""
-    return -BESIDE - SAME <= advance - round(advance) < LEAST_PART
+    return -1.5 * LEAST_PART <= advance - round(advance) < LEAST_PART
 
 
 def _beyond_corner(advance: float) -> bool:
@@ -307,14 +309,17 @@ def _beyond_corner(advance: float) -> bool:
 def _place(line: Line, start: float, step: float, near: bool = True) -> float:
     """The advance (arcs) of a line after a step (arcs) from ``start``.
 
-    If the step ends closer than LEAST_PART to a corner, the line stops at BESIDE beyond the corner.
-    If it is there already, it goes to BESIDE before the corner. near: is the shape close to
+    If the step ends closer than LEAST_PART to a corner, the line stops on its own side of it, at
+    the distance BESIDE. If it is there already, it crosses the corner. near: is the shape close to
     equilibrium? Otherwise a line beside a corner does not cross it.
     """
     place = max(start + min(max(step, -LONGEST), LONGEST), line.least, line.newton_minimum)
     corner = round(place)
     if abs(place - corner) >= LEAST_PART:
         return place
-    if abs(start - corner) > BESIDE + SAME or place > start and near:
-        return corner + BESIDE
-    return max(corner - BESIDE, line.least) if near else start
+    beyond = start > corner
+    if abs(start - corner) <= BESIDE + SAME:
+        if not near:
+            return start
+        beyond = place > start
+    return corner + BESIDE if beyond else max(corner - BESIDE, line.least)
