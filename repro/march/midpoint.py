@@ -15,6 +15,7 @@ shape.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -22,6 +23,7 @@ import numpy as np
 
 from repro.fem import transfer
 from repro.fem.space import Space
+from repro.fem.walls import numbered
 from repro.march.balance import Ledger
 from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_density, refuse_fold
@@ -141,13 +143,29 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
     advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
                 for key in half.expansion.advances}
     if half.end is None:
-        first, second = (_last_advances(previous, number, half.duration / 2) for number in (0, 1))
-        advances |= {key: length * (1 + second[key] / first[key])
-                     for key, length in half.expansion.advances.items()
-                     if second.get(key, np.inf) < first.get(key, 0.0)}
+        advances |= _slower_advances(previous, half)
     search = replace(search, advances=advances,
                      line_size=stages.remeshing.meshing.sizes.moving_lines)
     return stages.expand(previous, after, _guess_shape(previous, shapes), search)
+
+
+def _slower_advances(previous: Pore, half: Halfway) -> dict[tuple[int, int, int], float]:
+    """Advances (um) at the end of a step of the lines that are expected to slow down.
+
+    Lines slow down after the first half as in the last step. After a first contact, its length
+    grows like the square root of time, as that of a round body.
+    """
+    first, second = (_last_advances(previous, number, half.duration / 2) for number in (0, 1))
+    advances = {}
+    for key, length in half.expansion.advances.items():
+        number, wall, _ = key
+        outline = previous.outlines[number]
+        if key not in first and wall != outline.seat.wall:
+            before = outline.contact_length(numbered(previous.walls, wall)) / 2
+            advances[key] = math.sqrt(2 * (before + length)**2 - before**2) - before
+        elif second.get(key, 0.0) < first.get(key, 0.0):
+            advances[key] = length * (1 + second[key] / first[key])
+    return advances
 
 
 def _last_advances(previous: Pore, half: int,
