@@ -159,9 +159,9 @@ def _slower_advances(previous: Pore, half: Halfway) -> dict[tuple[int, int, int]
     advances = {}
     for key, length in half.expansion.advances.items():
         number, wall, _ = key
-        outline = previous.outlines[number]
-        if key not in first and wall != outline.seat.wall:
-            before = outline.contact_length(numbered(previous.walls, wall)) / 2
+        own = previous.focused(number)
+        if key not in first and wall != own.boundary.seat.wall:
+            before = own.boundary.contact_length(numbered(own.walls, wall)) / 2
             advances[key] = math.sqrt(2 * (before + length)**2 - before**2) - before
         elif second.get(key, 0.0) < first.get(key, 0.0):
             advances[key] = length * (1 + second[key] / first[key])
