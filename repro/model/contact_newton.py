@@ -217,7 +217,8 @@ class Coupled:
                     change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Steps (L,) of the lines (arcs), and the change of all unknowns with these steps.
 
-        change: of all unknowns, with lines at rest.
+        change: of all unknowns, with lines at rest. In the first iteration lines within arcs stay,
+        because the shape is far from the walls, and its clearances say little.
         """
         ahead = self.position + _nodal(change, self.position)
         clearances, reaches = self.placed.clearances(ahead, self._lines)
@@ -297,7 +298,7 @@ def _leave_corner(line: Line, clearance: float, reach: float) -> float:
 
 
 def _before_corner(advance: float) -> bool:
-    """Is an advance (arcs) at a corner or just before it?"""
+    """Is an advance (arcs) at a corner or just before it? A shortened step ends before BESIDE."""
     return -1.5 * LEAST_PART <= advance - round(advance) < LEAST_PART
 
 
