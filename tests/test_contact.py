@@ -2,6 +2,7 @@
 
 import signal
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from repro.fem import linear
 from repro.fem.division import Division
 from repro.fem.outline import Outline, polygon
 from repro.fem.space import Space
-from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls
+from repro.fem.walls import BOTTOM, FREE, TOP, channel_walls, numbered
 from repro.march import midpoint, simulation
 from repro.march.simulation import simulate
 from repro.march.state import RestartState
@@ -371,6 +372,20 @@ def test_a_run_stops_within_a_step_in_contact(plugged, tmp_path):
 def rows_at(scene, times):
     """The rows of a scene at given times (h)."""
     return [*simulate(load_scene(scene, [f"output.times={[f'{time!r} h' for time in times]}"]))][1:]
+
+
+def test_lines_slow_down_in_a_step_as_in_the_last_one(plugged):
+    """After a first contact its half length a grows like the square root of time: a^2 = a0^2 + k t."""
+    pore = plugged[1]
+    key = 0, TOP, 1
+    halfway = SimpleNamespace(duration=1.0, expansion=SimpleNamespace(advances={key: 3.0}))
+    speeds = np.zeros((2, 2, 2))
+    speeds[:, TOP - 1, 0] = 4.0, 1.0
+    known, unknown = (midpoint._slower_advances(pore.with_body(line_speeds=each), halfway)[key]
+                      for each in (speeds, None))
+    assert known == pytest.approx(3.75)
+    before = pore.boundary.contact_length(numbered(pore.walls, TOP)) / 2
+    assert (before + unknown)**2 - before**2 == pytest.approx(2 * ((before + 3)**2 - before**2))
 
 
 @pytest.mark.thorough
