@@ -15,6 +15,7 @@ shape.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -22,6 +23,7 @@ import numpy as np
 
 from repro.fem import transfer
 from repro.fem.space import Space
+from repro.fem.walls import numbered
 from repro.march.balance import Ledger
 from repro.march.ends import refuse_outside
 from repro.march.folding import refuse_density, refuse_fold
@@ -106,7 +108,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     generated = (GeneratedMesh(expanded, new),) if remeshed else ()
     refuse_density(previous, new, stages.remeshing.maximum_density)
     makes_contact = expanded.spanning > previous.spanning
-    new = _with_line_speeds(new, previous, expansion, duration)
+    new = _with_line_speeds(new, previous, half, expansion)
     flows = integrated(duration, half.solved.substrates.fluxes)
     ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
                     after.mass - previous.mass, new.mass, flows.unmet)
@@ -117,12 +119,17 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     return Attempt(step, change, expansion.gaps if makes_contact else None)
 
 
-def _with_line_speeds(new: Pore, previous: Pore, expansion: Expansion, duration: float) -> Pore:
-    """The pore with the speeds of contact lines in a step; unknown after a first contact."""
+def _with_line_speeds(new: Pore, previous: Pore, half: Halfway, end: Expansion) -> Pore:
+    """The pore with the speeds of contact lines in both halves of a step.
+
+    They are unknown after a first contact.
+    """
+    first = half.expansion.advances
+    second = {key: max(length - first.get(key, 0.0), 0.0) for key, length in end.advances.items()}
     bodies = []
     for number, (before, after) in enumerate(zip(previous.bodies, new.bodies)):
         makes_contact = after.spans and not before.spans
-        speeds = contact_lines.speeds(expansion.advances, number, duration)
+        speeds = contact_lines.speeds((first, second), number, half.duration / 2)
         bodies.append(replace(after, line_speeds=None if makes_contact else speeds))
     return replace(new, bodies=tuple(bodies))
 
@@ -132,14 +139,47 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
     """Equilibrium of the aggregates at a fraction ``part`` of the step.
 
     The search starts from the shapes known so far. Contact lines start at interpolated positions
-    and have small triangles there.
+    and have small triangles there. For the end of the step, lines are assumed to slow down after
+    the first half as in the last step.
     """
     shapes = _known_shapes(half, part)
     advances = {key: sum(weight * shape.advances.get(key, 0.0) for weight, shape in shapes)
                 for key in half.expansion.advances}
+    if half.end is None:
+        advances |= _slower_advances(previous, half)
     search = replace(search, advances=advances,
                      line_size=stages.remeshing.meshing.sizes.moving_lines)
     return stages.expand(previous, after, _guess_shape(previous, shapes), search)
+
+
+def _slower_advances(previous: Pore, half: Halfway) -> dict[tuple[int, int, int], float]:
+    """Advances (um) at the end of a step of the lines that are expected to slow down.
+
+    Lines slow down after the first half as in the last step. After a first contact, its length
+    grows like the square root of time, as that of a round body.
+    """
+    first, second = (_last_advances(previous, number, half.duration / 2) for number in (0, 1))
+    advances = {}
+    for key, length in half.expansion.advances.items():
+        number, wall, _ = key
+        own = previous.focused(number)
+        if key not in first and wall != own.boundary.seat.wall:
+            before = own.boundary.contact_length(numbered(own.walls, wall)) / 2
+            advances[key] = math.sqrt(2 * (before + length)**2 - before**2) - before
+        elif second.get(key, 0.0) < first.get(key, 0.0):
+            advances[key] = length * (1 + second[key] / first[key])
+    return advances
+
+
+def _last_advances(previous: Pore, half: int,
+                   duration: float) -> dict[tuple[int, int, int], float]:
+    """Advances (um) of the lines in a duration (h) at their speeds in a half (0 or 1) of the last
+    step. Lines of unknown speeds are left out."""
+    advances: dict[tuple[int, int, int], float] = {}
+    for number, body in enumerate(previous.bodies):
+        if body.line_speeds is not None:
+            advances |= contact_lines.advances_at(body.line_speeds[half], number, duration)
+    return advances
 
 
 def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, duration: float,
@@ -151,10 +191,7 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
     of the mesh at the start.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
-    advances: dict[tuple[int, int, int], float] = {}
-    for number, body in enumerate(previous.bodies):
-        advances |= contact_lines.advances_at(body.line_speeds, number, duration / 2)
-    search = replace(search, advances=advances)
+    search = replace(search, advances=_last_advances(previous, 1, duration / 2))
     expansion = stages.expand(previous, ahead, _scale_shape(previous, ahead), search)
     shape = expansion.pore
     mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)
@@ -256,7 +293,7 @@ def _scale_shape(previous: Pore, after: Pore) -> Pore:
         fixed = outline.points[outline.fixed][:1]
         scale = np.sqrt(grown.mass / before.mass)
         points[region.nodes] = fixed + (points[region.nodes] - fixed) * scale
-    return _place_bodies(after, points)
+    return _place_bodies(after, points) or after
 
 
 def _known_shapes(half: Halfway, part: float) -> list[tuple[float, Expansion]]:
@@ -271,18 +308,25 @@ def _known_shapes(half: Halfway, part: float) -> list[tuple[float, Expansion]]:
 
 
 def _guess_shape(previous: Pore, shapes: list[tuple[float, Expansion]]) -> Pore:
-    """Initial guess of the shape from the result of :func:`_known_shapes`."""
+    """Initial guess of the shape from the result of :func:`_known_shapes`.
+
+    If this turns a triangle over, the guess is the shape half way, or the one at the start.
+    """
     corners = previous.mesh.corners
-    push = previous.pressure
-    points = previous.mesh.points
-    for weight, shape in shapes:
-        push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
-        points = points + weight * (shape.position - previous.mesh.points)
-    return _place_bodies(replace(previous, pressure=push), points)
+    for known in (shapes, [(1.0, shapes[0][1])]):
+        push = previous.pressure
+        points = previous.mesh.points
+        for weight, shape in known:
+            push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
+            points = points + weight * (shape.position - previous.mesh.points)
+        guess = _place_bodies(replace(previous, pressure=push), points)
+        if guess:
+            return guess
+    return previous
 
 
-def _place_bodies(after: Pore, points: np.ndarray) -> Pore:
-    """Move the aggregates' nodes to ``points`` (N, 2) um, unless this turns a triangle over."""
+def _place_bodies(after: Pore, points: np.ndarray) -> Pore | None:
+    """Move the aggregates' nodes to ``points`` (N, 2) um; None if this turns a triangle over."""
     moved = after.moved(after.mesh.from_body(points[after.mesh.body], after.mesh.points))
     biomass_cells = np.flatnonzero(moved.mesh.biomass)
-    return after if moved.mesh.turned_over(biomass_cells).any() else moved
+    return None if moved.mesh.turned_over(biomass_cells).any() else moved

@@ -39,8 +39,8 @@ from repro.model.solid import Shape, material
 RETREATS = 6
 #: Accepted defect of Newton's method for all parts of theta except the last.
 PARTLY = 1e-3
-#: In the first contact, Newton's method replaces the search if all clearances are below this.
-CLOSE_ENOUGH = 0.2
+#: Newton's method replaces the search if the next steps of all lines are shorter than this (arcs).
+CLOSE_ENOUGH = 0.5
 #: Trial lengths of the first contact on each side of the nearest point, over the least film.
 FIRST_LENGTHS = np.array([1.0, 0.5, 0.25])
 
@@ -78,7 +78,10 @@ class ByLines(Closing):
         lines = contact_lines.lines_of(grown.boundary)
         _place_lines(grown.boundary, lines, self._advances)
         gaps = inf, inf
-        shape = self.settle(wall, lines) if grown.body.spans and not search.stationary else None
+        shape = None
+        settles = not (grown.body.spans and self._advances)
+        if not settles and not search.stationary:
+            shape = self.settle(wall, lines)
         if shape is None:
             shape = self.solve(wall, lines)
             gaps = (grown.boundary.gap(self._rule.walls),
@@ -87,28 +90,31 @@ class ByLines(Closing):
                 search.refuse_late(gaps, film)
                 wall, lines, shape = self._touch(shape)
             if not search.stationary:
-                shape = self._search(wall, lines, shape)
+                shape = self._search(wall, lines, shape, settles)
         rest = with_new_surfaces(shape.pore)
         return replace(shape, pore=rest, iterations=self.iterations, gaps=gaps)
 
-    def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion) -> Expansion:
-        """Move lines until all are accepted, or until Newton's method solves a first contact."""
-        settles = not self.grown.body.spans
+    def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion,
+                settles: bool) -> Expansion:
+        """Move lines until all are accepted, or until Newton's method solves for them.
+
+        settles: is Newton's method tried?
+        """
         for _ in range(CONTACT_ROUNDS):
             outline = shape.pore.boundary
             for line in lines:
                 line.record(*self._rule.beyond(outline, line.end_on(outline), line.direction))
             if all(line.accepted for line in lines):
                 return shape
-            if settles and all(line.accepted or abs(line.trials[-1][1]) < CLOSE_ENOUGH
+            for line in lines:
+                if not line.accepted:
+                    line.step()
+            if settles and all(abs(line.advance - line.trials[-1][0]) < CLOSE_ENOUGH
                                for line in lines):
                 settles = False
                 settled = self.settle(wall, lines)
                 if settled is not None:
                     return settled
-            for line in lines:
-                if not line.accepted:
-                    line.step()
             shape = self.solve(wall, lines)
         raise GrowthError(f"the contact lines still move after {CONTACT_ROUNDS} trials")
 

@@ -140,9 +140,14 @@ class Clearance:
         """
         arcs, last = _free_arcs(outline, node, direction)
         outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
-        place, points = self._places(arcs, outwards)
-        distance = outwards * (points[:, 0] - arcs[0, 0, 0])
         wall = numbered(self.walls, outline.wall[node])
+        # Elsewhere the clearance is AMPLE. An arc lies within its control points.
+        ends = wall.film(arcs[:, [0, 2]])
+        control = 2 * wall.film(arcs[:, 1]) - ends.mean(axis=1)
+        near = np.flatnonzero(np.minimum(ends.min(axis=1), control) < (AMPLE + 1) * self.film)
+        line = arcs[0, 0, 0]
+        place, points = self._places(arcs[near], near, outwards, line)
+        distance = outwards * (points[:, 0] - line)
         gap = wall.film(points)
         needs = np.minimum(self.film, np.tan(self.angle) * distance)
         tested_from = ANGLE_FROM * (1 - ROUND_OFF) * self.film / np.tan(self.angle)
@@ -158,17 +163,19 @@ class Clearance:
         ratio[through] = gap[through] / self.film
         return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
 
-    def _places(self, arcs: np.ndarray, outwards: float) -> tuple[np.ndarray, np.ndarray]:
-        """Points of the free surface at which the rule is tested: (K,) arcs from the line, (K, 2)
-        um.
+    def _places(self, arcs: np.ndarray, numbers: np.ndarray, outwards: float,
+                line: float) -> tuple[np.ndarray, np.ndarray]:
+        """Points of arcs at which the rule is tested: (K,) arcs from the line, (K, 2) um.
 
-        They are PLACES of each arc, the points where the test of the angle begins, and the points
-        where the rule changes from the angle to the film.
+        arcs: (k, 3, 2) um; numbers: (k,) of the arcs, counted from the line; outwards: sign of x
+        away from the line; line: um, x of the line. The points are PLACES of each arc, the points
+        where the test of the angle begins, and the points where the rule changes from the angle to
+        the film.
         """
         points = AT_PLACES @ arcs
-        place = np.arange(len(arcs))[:, None] + PLACES
+        place = numbers[:, None] + PLACES
         places, all_points = [place.ravel()], [points.reshape(-1, 2)]
-        nodes = outwards * (arcs[..., 0] - arcs[0, 0, 0]) * np.tan(self.angle) / self.film
+        nodes = outwards * (arcs[..., 0] - line) * np.tan(self.angle) / self.film
         for change in (ANGLE_FROM, 1.0):
             beyond = nodes @ AT_PLACES.T - change
             arc, k = np.nonzero(beyond[:, :-1] * beyond[:, 1:] < 0)
@@ -178,7 +185,7 @@ class Clearance:
             for _ in range(3):  # Newton's method; the interpolated t is close
                 error = np.einsum("ka,ka->k", parabola(t), nodes[arc]) - change
                 t = t - error / (first + second * t)
-            places.append(arc + t)
+            places.append(numbers[arc] + t)
             all_points.append(np.einsum("ka,kai->ki", parabola(t), arcs[arc]))
         return np.concatenate(places), np.vstack(all_points)
 
@@ -342,29 +349,29 @@ def point_at(outline: Outline, line: Line, length: float) -> np.ndarray:
     return parabola(np.array(advance - arc)) @ arcs[arc]
 
 
-def speeds(advances: Advances, number: int, duration: float) -> np.ndarray | None:
-    """(2, 2) um/h, speeds of an aggregate's lines by wall and direction.
+def speeds(advances: Sequence[Advances], number: int, duration: float) -> np.ndarray | None:
+    """(K, 2, 2) um/h, speeds of an aggregate's lines in K parts of a step, by wall and direction.
 
-    advances: um, in a duration (h). Returns None if all lines are on one wall.
+    advances: um, in each part; duration: h, of each part. Returns None if all lines are on one
+    wall.
     """
-    own = {key[1:]: length for key, length in advances.items() if key[0] == number}
-    walls = {wall for wall, _ in own}
+    keys = [key for key in advances[-1] if key[0] == number]
+    walls = {wall for _, wall, _ in keys}
     if len(walls) < 2:
         return None
-    by_line = np.zeros((max(walls), 2))
-    for (wall, direction), length in own.items():
-        by_line[wall - 1, (1 - direction) // 2] = length / duration
-    return by_line
+    by_line = np.zeros((len(advances), max(walls), 2))
+    for key in keys:
+        _, wall, direction = key
+        by_line[:, wall - 1, (1 - direction) // 2] = [part.get(key, 0.0) for part in advances]
+    return by_line / duration
 
 
-def advances_at(by_line: np.ndarray | None, number: int,
+def advances_at(by_line: np.ndarray, number: int,
                 duration: float) -> dict[tuple[int, int, int], float]:
     """{(number, wall, direction): um}, advances of an aggregate's lines in a duration (h).
 
-    by_line: as :func:`speeds` returns it.
+    by_line: (2, 2) um/h, speeds in one part of a step, as :func:`speeds` returns them.
     """
-    if by_line is None:
-        return {}
     return {(number, wall, direction): float(by_line[wall - 1, (1 - direction) // 2] * duration)
             for wall in range(1, len(by_line) + 1) for direction in (1, -1)}
 

@@ -217,7 +217,8 @@ class Coupled:
                     change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Steps (L,) of the lines (arcs), and the change of all unknowns with these steps.
 
-        change: of all unknowns, with lines at rest.
+        change: of all unknowns, with lines at rest. In the first iteration lines within arcs stay,
+        because the shape is far from the walls, and its clearances say little.
         """
         ahead = self.position + _nodal(change, self.position)
         clearances, reaches = self.placed.clearances(ahead, self._lines)
@@ -226,6 +227,8 @@ class Coupled:
                   if not _fits(line, clearances[k], AT_REST)]
         within = [k for k in moving if self.placed.within_arc(self._lines[k])]
         near = iterate.defect < NEAR
+        if self.iterations == 0 and within:
+            return steps, change
         for k in moving:
             line = self._lines[k]
             if near and clearances[k] < 0 and _before_corner(line.advance):
@@ -295,8 +298,8 @@ def _leave_corner(line: Line, clearance: float, reach: float) -> float:
 
 
 def _before_corner(advance: float) -> bool:
-    """Is an advance (arcs) at a corner or just before it?"""
-    return -BESIDE - SAME <= advance - round(advance) < LEAST_PART
+    """Is an advance (arcs) at a corner or just before it? A shortened step ends before BESIDE."""
+    return -1.5 * LEAST_PART <= advance - round(advance) < LEAST_PART
 
 
 def _beyond_corner(advance: float) -> bool:
@@ -307,14 +310,17 @@ def _beyond_corner(advance: float) -> bool:
 def _place(line: Line, start: float, step: float, near: bool = True) -> float:
     """The advance (arcs) of a line after a step (arcs) from ``start``.
 
-    If the step ends closer than LEAST_PART to a corner, the line stops at BESIDE beyond the corner.
-    If it is there already, it goes to BESIDE before the corner. near: is the shape close to
+    If the step ends closer than LEAST_PART to a corner, the line stops on its own side of it, at
+    the distance BESIDE. If it is there already, it crosses the corner. near: is the shape close to
     equilibrium? Otherwise a line beside a corner does not cross it.
     """
     place = max(start + min(max(step, -LONGEST), LONGEST), line.least, line.newton_minimum)
     corner = round(place)
     if abs(place - corner) >= LEAST_PART:
         return place
-    if abs(start - corner) > BESIDE + SAME or place > start and near:
-        return corner + BESIDE
-    return max(corner - BESIDE, line.least) if near else start
+    beyond = start > corner
+    if abs(start - corner) <= BESIDE + SAME:
+        if not near:
+            return start
+        beyond = place > start
+    return corner + BESIDE if beyond else max(corner - BESIDE, line.least)
