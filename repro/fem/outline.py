@@ -31,9 +31,9 @@ ON_ARC = 16
 class Outline:
     """Boundary of the aggregate.
 
-    points: (M, 2) um; wall: (M,) number of the wall that each node touches, FREE or WELD; fixed:
-    (M,) True where x is always fixed; origin: (M, 2) um, position of each node's material at t = 0;
-    geometry: 1 for straight edges, 2 for arcs; seat: position of its seed.
+    points: (M, 2) um; wall: (M,) number of the wall that each node touches or of its weld, or FREE;
+    fixed: (M,) True where x is always fixed; origin: (M, 2) um, position of each node's material at
+    t = 0; geometry: 1 for straight edges, 2 for arcs; seat: position of its seed.
     """
 
     points: np.ndarray

@@ -168,7 +168,7 @@ def each_beside(outlines: Sequence[Outline], sizing: Sizing) -> Iterator[tuple[O
     """Each outline with its element sizes, which depend on the corners of the other outlines."""
     for outline in outlines:
         others = tuple(other.corners for other in outlines if other is not outline)
-        yield outline, replace(sizing, others=others)
+        yield outline, replace(sizing, others=sizing.others + others)
 
 
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
@@ -223,7 +223,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     pieces = []
     for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(polygon.points)
-        if edge_wall[keep[0]] == WELD:  # both aggregates share the nodes of a weld
+        if edge_wall[keep[0]] >= WELD:  # both aggregates share the nodes of a weld
             halves = np.arange(outline.geometry) / outline.geometry
             pieces.append((np.repeat(keep[:-1], len(halves)), np.tile(halves, len(keep) - 1)))
         elif edge_wall[keep[0]] != FREE:

@@ -24,7 +24,8 @@ import numpy as np
 FREE = 0
 BOTTOM = 1
 TOP = 2
-#: Number for the surface of another aggregate, to which an aggregate is welded. It is not a wall.
+#: Number of the first weld: a surface that two aggregates share. Further welds have the next
+#: numbers. A weld is not a wall.
 WELD = 3
 
 
@@ -106,7 +107,7 @@ def channel_walls(width: float, bonded: bool = False, upper: str = "no slip") ->
 
 def touches_wall(numbers: np.ndarray) -> np.ndarray:
     """(M,) True where a node touches a wall, from :attr:`Outline.wall`: not free and not welded."""
-    return (numbers != FREE) & (numbers != WELD)
+    return (numbers != FREE) & (numbers < WELD)
 
 
 def numbered(walls: Walls, number: int) -> Wall:

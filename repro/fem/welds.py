@@ -1,16 +1,17 @@
 """Welded aggregates: their boundaries share the nodes of the weld.
 
-Nodes of a weld have the number WELD in both outlines, and the same coordinates to the last bit.
-Each outline keeps its own coordinates at t = 0. An end of the weld is a line where the free
-surfaces of both aggregates meet and form a notch. The corners of the two surfaces are opposite: the
-k-th corner from the line on one surface is at about the same arc length as the k-th corner on the
-other surface. A new mesh gives both surfaces these corners (:func:`matched`), so that the weld can
+Nodes of a weld have its number in both outlines, and the same coordinates to the last bit. The
+first weld has the number WELD, and each aggregate has at most one weld (:func:`pairs`). Each
+outline keeps its own coordinates at t = 0. An end of the weld is a line where the free surfaces of
+both aggregates meet and form a notch. The corners of the two surfaces are opposite: the k-th corner
+from the line on one surface is at about the same arc length as the k-th corner on the other
+surface. A new mesh gives both surfaces these corners (:func:`matched`), so that the weld can
 advance by nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +40,19 @@ AT_CORNER = 0.05
 ROUNDS = 12
 
 
+def weld_of(wall: np.ndarray) -> int:
+    """Number of the weld of an aggregate, FREE without one; wall: (M,) as :attr:`Outline.wall`."""
+    largest = int(wall.max())
+    return largest if largest >= WELD else FREE
+
+
+def pairs(walls: Sequence[np.ndarray]) -> list[tuple[int, int]]:
+    """Indices of the two aggregates of each weld; walls: (M,) :attr:`Outline.wall` of each."""
+    numbers = [weld_of(wall) for wall in walls]
+    return [(first, numbers.index(number, first + 1)) for first, number in enumerate(numbers)
+            if number != FREE and number not in numbers[:first]]
+
+
 def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndarray]]:
     """(K, 2) um, the points of all outlines, with the points of a weld once; and for each outline,
     (M,) indices of its points."""
@@ -50,35 +64,44 @@ def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndar
 
 def united(outlines: Sequence[Outline],
            own: Sequence[np.ndarray]) -> tuple[list[Outline], list[np.ndarray]]:
-    """Replace two welded outlines by the outline around both; others stay unchanged.
+    """Replace each two welded outlines by the outline around both; others stay unchanged.
 
     own: as :func:`shared_points` returns it. Returns the outlines, and ``own`` for them. Raises
     MeshError if two aggregates share more than one chain of nodes.
     """
-    if len(outlines) != 2 or not np.isin(own[0], own[1]).any():
-        return list(outlines), list(own)
-    first, second = outlines
-    weld = np.isin(own[0], own[1])
+    left = dict(enumerate(zip(outlines, own)))
+    for first, second in pairs([outline.wall for outline in outlines]):
+        if np.isin(own[first], own[second]).any():  # not if they have just met
+            left[first] = _around(left[first], left.pop(second))
+    return [outline for outline, _ in left.values()], [nodes for _, nodes in left.values()]
+
+
+def _around(one: tuple[Outline, np.ndarray],
+            other: tuple[Outline, np.ndarray]) -> tuple[Outline, np.ndarray]:
+    """The outline around two welded ones, each with the indices (M,) of its points."""
+    first, first_own = one
+    second, second_own = other
+    weld = np.isin(first_own, second_own)
     starts = np.flatnonzero(weld & ~np.roll(weld, 1))
     if len(starts) != 1:
         raise MeshError("two aggregates touch at several places; a weld joins them at one place")
     size = int(weld.sum())
     around = (starts[0] + size - 1 + np.arange(len(weld) - size + 2)) % len(weld)
-    of_second = np.isin(own[1], own[0])
+    of_second = np.isin(second_own, first_own)
     begin = int(np.flatnonzero(of_second & ~np.roll(of_second, 1))[0]) + size
     beyond = (begin + np.arange(len(of_second) - size)) % len(of_second)
     wall = np.concatenate([first.wall[around], second.wall[beyond]])
     both = Outline(np.concatenate([first.points[around], second.points[beyond]]),
-                   np.where(wall == WELD, FREE, wall),
+                   np.where(wall >= WELD, FREE, wall),
                    np.concatenate([first.fixed[around], second.fixed[beyond]]),
                    np.concatenate([first.origin[around], second.origin[beyond]]),
                    first.geometry, first.seat)
-    return [both], [np.concatenate([own[0][around], own[1][beyond]])]
+    return both, np.concatenate([first_own[around], second_own[beyond]])
 
 
 def ends_of(outline: Outline) -> tuple[int, int]:
     """The first and the last node of an outline's weld, along its loop."""
-    weld = outline.wall == WELD
+    weld = outline.wall >= WELD
     first = np.flatnonzero(weld & ~np.roll(weld, 1))[0]
     last = np.flatnonzero(weld & ~np.roll(weld, -1))[0]
     return int(first), int(last)
@@ -133,28 +156,44 @@ def _shortest(lengths: np.ndarray) -> np.ndarray:
     return np.minimum(edges[:-1], edges[1:])
 
 
-def _are_welded(outlines: Sequence[Outline]) -> bool:
-    return len(outlines) == 2 and all((outline.wall == WELD).any() for outline in outlines)
+def _of_each_pair(change: Callable[[Sequence[Outline], Sizing], Sequence[Outline]],
+                  outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The outlines after a ``change`` of each two that are welded."""
+    changed = list(outlines)
+    for pair in pairs([outline.wall for outline in outlines]):
+        others = tuple(each.corners for k, each in enumerate(outlines) if k not in pair)
+        welded = change([outlines[k] for k in pair], replace(sizing, others=others))
+        for k, outline in zip(pair, welded):
+            changed[k] = outline
+    return changed
 
 
 def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
-    """The same curves with opposite corners beyond a weld, and short edges at its ends."""
-    if not _are_welded(outlines):
-        return list(outlines)
+    """The same curves with opposite corners beyond each weld, and short edges at its ends."""
+    return _of_each_pair(_matched, outlines, sizing)
+
+
+def _matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """:func:`matched` for two welded outlines."""
     return _with_opposite(_refined(outlines, sizing), sizing.film)
 
 
 def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
-    """The outlines of welded aggregates with fewer corners along the weld and beyond its ends.
+    """The outlines of welded aggregates with fewer corners along each weld and beyond its ends.
 
     A corner leaves if the edge without it needs no split, or if it is too close to another one.
     Opposite corners leave together. Element sizes grow from the lines to the size of an interface.
     Corners of the shapes at t = 0 stay. The middle of a longer arc is a point of the curve.
     Outlines that have just met have a weld of one node, and stay unchanged.
     """
-    if not _are_welded(outlines) or np.count_nonzero(outlines[0].wall == WELD) == 1:
+    return _of_each_pair(_coarsened, outlines, sizing)
+
+
+def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """:func:`coarsened` for two welded outlines."""
+    if np.count_nonzero(outlines[0].wall >= WELD) == 1:
         return list(outlines)
-    outlines = matched(outlines, sizing)
+    outlines = _matched(outlines, sizing)
     for place in range(2):
         walks = notches(*outlines)[place]
         lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
@@ -325,9 +364,9 @@ def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
     return placed(outline, every, np.concatenate(parts))
 
 
-def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
+def facing(first: Outline, second: Outline, reach: float, weld: int = WELD) -> list[Outline]:
     """The same curves with new corners: one at the point nearest to the other curve, marked as a
-    weld, and one at the arc length ``reach`` (um) on each side of it."""
+    weld with the number ``weld``, and one at the arc length ``reach`` (um) on each side of it."""
     outlines = []
     for outline, (edge, t) in zip((first, second), _nearest(first, second)):
         edges = len(outline.points) // outline.geometry
@@ -336,7 +375,7 @@ def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
             outline = cut(outline, [(edge, t)])
             node = outline.geometry * (edge + 1)
         wall = outline.wall.copy()
-        wall[node] = WELD
+        wall[node] = weld
         outline = replace(outline, wall=wall)
         sides = [_free_from(outline, node, direction) for direction in (1, -1)]
         outlines.append(cut(outline, [place for walk in sides

@@ -6,8 +6,8 @@ Each end is an event with a margin: zero at the event and positive after it.
     tearing       largest tensile stress / growth.tensile_strength - 1
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
-    meeting       1 - film between two aggregates / growth.minimum_film, or, if they are welded,
-                  between one of them and the wall of the other one
+    meeting       1 - film between two aggregates / growth.minimum_film, or, if they are welded to
+                  each other, between one of them and the wall of the other one
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the
@@ -22,8 +22,8 @@ walls cannot hold the aggregate, or if erosion removes a contact surface: the mo
 surface that becomes free.
 
 With growth.meeting = "weld", two aggregates on opposite walls join when they meet
-(:mod:`repro.model.welding`), and the run continues. :attr:`repro.Scene.without_weld` gives the
-reason if they cannot join.
+(:mod:`repro.model.welding`), and the run continues. Otherwise the message gives the reason:
+:attr:`repro.Scene.without_weld`, or the walls that the two touch, or the weld that one of them has.
 
 With growth.until = "steady", a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
@@ -46,10 +46,12 @@ import numpy as np
 from repro.errors import RunEnd, StageError
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_PORE
+from repro.fem.welds import weld_of
 from repro.march.folding import Fold, fold_message, most_compressed
 from repro.march.state import Compression, StepResult
 from repro.model import adhesion
 from repro.model.adhesion import Loading, Peak
+from repro.model.body import Body
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.scene import Pore as Channel
@@ -92,8 +94,8 @@ class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
 
     With ``growth.meeting = "weld"``, the default, two aggregates on opposite walls join instead,
-    and the run continues until one of them reaches the wall of the other one. This would enclose
-    water.
+    and the run continues until one of them reaches the wall of the other one, or a third aggregate.
+    The former would enclose water.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the coordinates (um).
@@ -155,13 +157,14 @@ class Event:
     """An end of a run in one state: its margin, and the exception that reports it.
 
     leaves: index of the aggregate that leaves the pore if growth.after_detachment = "continue";
-    None if the run ends. joins: do two aggregates join, so that the run continues?
+    None if the run ends. joins: indices of two aggregates that join, so that the run continues;
+    None if the run ends.
     """
 
     margin: float
     end: RunEnd
     leaves: int | None = None
-    joins: bool = False
+    joins: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,9 +191,9 @@ class Reached:
         return replace(self, event=replace(self.event, end=type(end)(text)))
 
     @property
-    def joins(self) -> bool:
-        """Do two aggregates join at the end of the step?"""
-        return self.event.joins and self.event.margin > 0
+    def joins(self) -> tuple[int, int] | None:
+        """Indices of two aggregates that join at the end of the step; None if none join."""
+        return self.event.joins if self.event.margin > 0 else None
 
     def leaves(self, continues: bool) -> int | None:
         """Index of the aggregate that leaves the pore at the end of the step; None if none leaves.
@@ -311,34 +314,53 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
     """The events of all pairs of aggregates."""
     least = ends.loading.growth.minimum_film
     for pair, film, (x, y) in _films(pore):
-        end = Meeting(f"{pair} meet at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the "
-                      f"film between them is {film:.3g} um, and it closes below "
-                      f"growth.minimum_film, {least:g} um; {ends.without_weld}")
-        yield Event(1 - film / least, end, joins=not ends.without_weld)
-    if pore.welded:
-        yield from _enclosures(least, pore)
+        reason = ends.without_weld or _apart(*[pore.bodies[number] for number in pair])
+        end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g}, "
+                      f"y = {y:.4g} um the film between them is {film:.3g} um, and it closes below "
+                      f"growth.minimum_film, {least:g} um; {reason}")
+        yield Event(1 - film / least, end, joins=None if reason else pair)
+    for pair in pore.welds:
+        yield from _enclosures(least, pore, pair)
 
 
-def _enclosures(least: float, pore: Pore) -> Iterator[Event]:
-    """The events of welded aggregates that reach the wall of the other one, which would enclose
+def _apart(one: Body, other: Body) -> str:
+    """Why two aggregates that meet do not join; empty if they join."""
+    if one.seat.wall == other.seat.wall:
+        return "only two aggregates on opposite walls can join"
+    for body in (one, other):
+        if body.spans:
+            beside = "is welded to another one" if weld_of(body.wall) else "touches both walls"
+            return f"aggregate {body.name} {beside}"
+    return ""
+
+
+def _enclosures(least: float, pore: Pore, pair: tuple[int, int]) -> Iterator[Event]:
+    """The events of two welded aggregates that reach the wall of the other one, which would enclose
     water; least: um, growth.minimum_film."""
-    for body, outline in zip(pore.bodies, pore.outlines):
+    for number in pair:
+        outline = pore.outlines[number]
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
-            names = " and ".join(each.name for each in pore.bodies)
-            end = Meeting(f"aggregates {names} meet at t = {pore.time:g} h: near x = {x:.4g} um "
-                          f"the film between aggregate {body.name} and the wall of the other one "
-                          f"is {film:.3g} um, and it closes below growth.minimum_film, {least:g} "
-                          "um; this would enclose water beside their weld")
+            end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g} um "
+                          f"the film between aggregate {pore.bodies[number].name} and the wall of "
+                          f"the other one is {film:.3g} um, and it closes below "
+                          f"growth.minimum_film, {least:g} um; this would enclose water beside "
+                          "their weld")
             yield Event(1 - film / least, end)
 
 
-def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:
-    """For each pair of aggregates: their names, the least film (um) and its coordinates (2,) um."""
-    if pore.welded:
-        return
-    for (one, outline), (other, beside) in combinations(zip(pore.bodies, pore.outlines), 2):
-        yield f"aggregates {one.name} and {other.name}", *outline.film(beside)
+def _films(pore: Pore) -> Iterator[tuple[tuple[int, int], float, np.ndarray]]:
+    """For each two aggregates that are not welded to each other: their indices, the least film (um)
+    and its coordinates (2,) um."""
+    for pair in combinations(range(len(pore.bodies)), 2):
+        if pair not in pore.welds:
+            one, other = (pore.outlines[number] for number in pair)
+            yield pair, *one.film(other)
+
+
+def _names(pore: Pore, pair: tuple[int, int]) -> str:
+    """Names of two aggregates in messages."""
+    return "aggregates " + " and ".join(pore.bodies[number].name for number in pair)
 
 
 def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: str, subject: str,
@@ -378,7 +400,7 @@ def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
     """
     for pair, film, _ in _films(expanded):
         if film == 0:
-            raise Meeting(f"{pair} meet in the step from t = {previous.time:g} h")
+            raise Meeting(f"{_names(expanded, pair)} meet in the step from t = {previous.time:g} h")
     for side in ("upstream", "downstream"):
         if elements_to_end(channel, expanded, side) < LEAST_ELEMENTS:
             nearest = expanded.name_of(farthest(expanded, side))

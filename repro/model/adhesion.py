@@ -206,13 +206,15 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
         water = flow.solve(rest.space, driven, loading.length, interface=loading.interface)
         solved = replace(solved, flow=water)
         forces = fluid_forces(loading, rest, solved) / loading.growth.shear_modulus
-    if rest.welded:
-        from repro.model.welding import Welding  # a run without a weld does not load it
-        return Welding(mechanics, rest, rest, forces).equilibrium(), solved
-    for number, region in enumerate(rest.mesh.regions):
-        seen = rest.focused(number)
-        own = None if forces is None else rest.mesh.of_region(region, forces)
-        rest, _ = equilibrium(mechanics, seen, seen, own)
+        forces = rest.mesh.from_body(forces)
+    for group in rest.groups:
+        if len(group) > 1:
+            from repro.model.welding import Welding  # a run without a weld does not load it
+            rest = Welding(mechanics, rest, rest, group, forces).equilibrium()
+        else:
+            seen = rest.focused(*group)
+            own = None if forces is None else forces[seen.region.nodes]
+            rest, _ = equilibrium(mechanics, seen, seen, own)
     return rest.focused(pore.focus), solved
 
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from repro.fem import welds
 from repro.fem.brief import brief
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
-from repro.fem.walls import WELD, Walls
+from repro.fem.walls import Walls
 from repro.model.body import Body
 from repro.scene import needed
 
@@ -73,9 +74,15 @@ class Pore:
         return sum(body.spans for body in self.bodies)
 
     @property
-    def welded(self) -> bool:
-        """Are the two aggregates welded to each other?"""
-        return any((body.wall == WELD).any() for body in self.bodies)
+    def welds(self) -> list[tuple[int, int]]:
+        """Indices of the two aggregates of each weld."""
+        return welds.pairs([body.wall for body in self.bodies])
+
+    @property
+    def groups(self) -> list[tuple[int, ...]]:
+        """Indices of the aggregates that move together: one alone, or the two of a weld."""
+        alone = set(range(len(self.bodies))).difference(*self.welds)
+        return sorted([*self.welds, *((number,) for number in alone)])
 
     @property
     def accumulates(self) -> bool:

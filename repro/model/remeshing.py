@@ -262,7 +262,7 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
         def carry(positions: np.ndarray, before: Region = expanded.mesh.regions[number],
                   after: Region = target.mesh.regions[number]) -> np.ndarray:
             nodal = old.from_region(before, positions)
-            if target.welded:  # the nodes of the weld have other positions in the other aggregate
+            if target.welds:  # the nodes of the weld have other positions in the other aggregate
                 own = transfer.located(old.points, before.cells, target.mesh.points[after.nodes])
                 return own.field(nodal, before.cells)
             carried = target.mesh.from_body(at.field(nodal, old.cells[old.biomass]))

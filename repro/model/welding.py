@@ -25,7 +25,8 @@ from repro.errors import GrowthError, LinearError
 from repro.fem import welds
 from repro.fem.division import Division
 from repro.fem.forms import Basis, basis
-from repro.fem.mesh import Mesh
+from repro.fem.mesh import Mesh, Region
+from repro.fem.outline import Outline
 from repro.fem.walls import FREE, WELD
 from repro.model import growth, remeshing
 from repro.model.closing_by_lines import divided
@@ -62,17 +63,20 @@ class WeldedSolid(Solid):
         return basis(self.shape.cells, len(self.reference), self.in_triangles, self.shape.table)
 
 
-def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float) -> Pore:
-    """The pore after two aggregates have met and joined.
+def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, int],
+         speed: float) -> Pore:
+    """The pore after two aggregates have met and joined; pair: their indices.
 
     The weld extends by the thickness of the least film on each side of the nearest points. speed:
     as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
     """
     film = mechanics.keys.minimum_film
-    first, second = pore.outlines
-    outlines = welds.facing(first, second, film)
+    outlines = list(pore.outlines)
+    weld = max(WELD, 1 + max(int(outline.wall.max()) for outline in outlines))
+    first, second = pair
+    outlines[first], outlines[second] = welds.facing(outlines[first], outlines[second], film, weld)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
-    shape = Welding(mechanics, facing, facing, reach=film).close()
+    shape = Welding(mechanics, facing, facing, pair, reach=film).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
 
 
@@ -167,27 +171,29 @@ def _along_arcs(nodes: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """The nodes of all aggregates, with the two nodes of a tied pair as one.
+    """The nodes of two aggregates, with the two nodes of a tied pair as one.
 
-    nodes: (n,) nodes of the mesh, ascending; number: (N,) index in ``nodes`` of each node of the
-    mesh, or of the node to which it is tied; cells: (t, k) triangles as indices into ``nodes``;
-    corners: number of corners among ``nodes``.
+    inside: (m,) nodes of the aggregates in the mesh, ascending; nodes: (n,) of these, without the
+    second node of each tied pair; number: (N,) index in ``nodes`` of each node inside, or of the
+    node to which it is tied; cells: (t, k) triangles as indices into ``nodes``; corners: number of
+    corners among ``nodes``.
     """
 
+    inside: np.ndarray
     nodes: np.ndarray
     number: np.ndarray
     cells: np.ndarray
     corners: int
 
     @staticmethod
-    def of(mesh: Mesh, tied: np.ndarray) -> Union:
-        """The union of a mesh's aggregates; tied: (k, 2) pairs of nodes."""
+    def of(mesh: Mesh, regions: Sequence[Region], tied: np.ndarray) -> Union:
+        """The union of the aggregates in two regions of a mesh; tied: (k, 2) pairs of nodes."""
         alias = np.arange(len(mesh.points))
         alias[tied[:, 1]] = tied[:, 0]
-        cells = alias[mesh.cells[mesh.biomass]]
-        nodes, own_cells = np.unique(cells, return_inverse=True)
-        return Union(nodes, np.searchsorted(nodes, alias), own_cells.reshape(cells.shape),
-                     int(np.count_nonzero(nodes < mesh.corners)))
+        cells = mesh.by_triangle([region.cells for region in regions], regions)
+        nodes, own_cells = np.unique(alias[cells], return_inverse=True)
+        return Union(np.unique(cells), nodes, np.searchsorted(nodes, alias),
+                     own_cells.reshape(cells.shape), int(np.count_nonzero(nodes < mesh.corners)))
 
     def summed(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
         """(n, ...) sums at the union's nodes of values (k, ...) at nodes (k,) of the mesh."""
@@ -201,31 +207,47 @@ class Welding:
     """Closing of the film between two aggregates that are welded, or that have just met.
 
     grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
-    shape and pressure from which the search starts; forces: (n, 2) um on the nodes of all
-    aggregates, over mu_L, None for no forces; reach: um, half of the first length of the weld if
-    the aggregates have just met, zero otherwise; patient: as in :class:`SearchOptions`.
+    shape and pressure from which the search starts; pair: indices of the two aggregates; forces:
+    (N, 2) um at the nodes of the mesh, over mu_L, None for no forces; reach: um, half of the first
+    length of the weld if the aggregates have just met, zero otherwise; patient: as in
+    :class:`SearchOptions`.
     """
 
     mechanics: Mechanics
     grown: Pore
     start: Pore
+    pair: tuple[int, ...]
     forces: np.ndarray | None = None
     reach: float = 0.0
     patient: bool = True
 
     def __post_init__(self) -> None:
         self._iterations = 0
-        self._notches = [self._notch(walks) for walks in welds.notches(*self.grown.outlines)]
+        self._notches = [self._notch(walks) for walks in welds.notches(*self._outlines)]
+
+    @property
+    def _outlines(self) -> list[Outline]:
+        """The boundaries of both aggregates."""
+        return [self.grown.outlines[number] for number in self.pair]
+
+    @property
+    def _loops(self) -> list[np.ndarray]:
+        """(M,) nodes of the boundary of each aggregate."""
+        return [self.grown.mesh.topology.loops[number] for number in self.pair]
+
+    @property
+    def _regions(self) -> list[Region]:
+        """The regions of both aggregates."""
+        return [self.grown.mesh.regions[number] for number in self.pair]
 
     def _notch(self, walks: Sequence[np.ndarray]) -> Notch:
         """The notch with the nodes ``walks`` on both outlines (:func:`welds.notches`)."""
         mesh = self.grown.mesh
         keys = self.mechanics.keys
         size = mesh.geometry
-        lengths = [welds.lengths_from(*each) for each in zip(self.grown.outlines, walks)]
+        lengths = [welds.lengths_from(*each) for each in zip(self._outlines, walks)]
         nodes = size * (welds.opposite_corners(*lengths) - 1) + 1
-        pairs = np.column_stack([loop[walk[:nodes]]
-                                 for loop, walk in zip(mesh.topology.loops, walks)])
+        pairs = np.column_stack([loop[walk[:nodes]] for loop, walk in zip(self._loops, walks)])
         return Notch(pairs, mesh.points[pairs], size, keys.minimum_film,
                      np.tan(keys.minimum_contact_angle),
                      int(np.abs(lengths[0] - self.reach).argmin()))
@@ -249,13 +271,13 @@ class Welding:
             tied = self._tied()
             for notch in self._notches:
                 notch.advance(shape.mesh.points)
-            walls = [self._closing(shape, number) for number in range(2)]
+            walls = [self._closing(shape, number) for number in self.pair]
             at_rest = np.array_equal(self._tied(), tied)
             if at_rest and not any((wall != FREE).any() for wall in walls):
                 return self._within_arcs(shape)
-            shape = replace(shape, bodies=tuple(
-                replace(body, wall=np.where(wall != FREE, wall, body.wall))
-                for wall, body in zip(walls, shape.bodies)))
+            for number, wall in zip(self.pair, walls):
+                seen = shape.focused(number)
+                shape = seen.with_body(wall=np.where(wall != FREE, wall, seen.body.wall))
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
 
     def _within_arcs(self, shape: Pore) -> Expansion:
@@ -303,19 +325,20 @@ class Welding:
         inside: indices of the notches; t: where their arcs are divided, from the line to the free
         surface.
         """
-        grown = replace(self.grown, bodies=tuple(
-            replace(body, wall=rest.wall, fixed=rest.fixed)
-            for body, rest in zip(self.grown.bodies, shape.bodies)))
+        grown = self.grown
+        for number in self.pair:
+            rest = shape.bodies[number]
+            grown = grown.focused(number).with_body(wall=rest.wall, fixed=rest.fixed)
         points = shape.mesh.points
         pressure = shape.pressure
         divisions = []
-        for number in range(2):
-            arcs, at = zip(*[self._last_arc(k, number, part) for k, part in zip(inside, t)])
+        for side, number in enumerate(self.pair):
+            arcs, at = zip(*[self._last_arc(k, side, part) for k, part in zip(inside, t)])
             order = np.argsort(arcs)
             division = Division(grown.mesh, np.array(arcs)[order], np.array(at)[order], number)
             free = np.full(len(arcs), FREE)
             contact = Contact(grown.bodies[number].wall, division.arcs, division.t, free, free)
-            grown = divided(grown.focused(number), division, contact).focused(None)
+            grown = divided(grown.focused(number), division, contact)
             points = division.nodal(points)
             pressure = division.at_corners(pressure)
             divisions.append(division)
@@ -323,20 +346,19 @@ class Welding:
         trial = replace(self, grown=grown, start=start)
         for k, notch in enumerate(self._notches):
             nodes = len(notch.pairs) + notch.size * (k in inside)
-            walks = welds.notches(*grown.outlines)[k]
-            pairs = np.column_stack([loop[walk[:nodes]] for loop, walk
-                                     in zip(grown.mesh.topology.loops, walks)])
+            walks = welds.notches(*trial._outlines)[k]
+            pairs = np.column_stack([loop[walk[:nodes]] for loop, walk in zip(trial._loops, walks)])
             trial._notches[k] = replace(notch, pairs=pairs, before=grown.mesh.points[pairs])
         return trial, start, tuple(divisions)
 
-    def _last_arc(self, k: int, number: int, t: float) -> tuple[int, float]:
+    def _last_arc(self, k: int, side: int, t: float) -> tuple[int, float]:
         """The last joined arc of a notch on one outline, and the place along the loop that is
         ``t`` along the arc from the line."""
-        middle = self._notches[k].pairs[2 * self._notches[k].joined - 1, number]
-        loop = self.grown.mesh.topology.loops[number]
+        middle = self._notches[k].pairs[2 * self._notches[k].joined - 1, side]
+        loop = self._loops[side]
         node = int(np.flatnonzero(loop == middle)[0])
         forward = loop[(node + 1) % len(loop)] == self._notches[k].pairs[
-            2 * self._notches[k].joined, number]
+            2 * self._notches[k].joined, side]
         return node // 2, t if forward else 1 - t
 
     def _tied(self) -> np.ndarray:
@@ -367,24 +389,26 @@ class Welding:
         """
         grown = self.grown
         mesh = grown.mesh
-        union = Union.of(mesh, tied)
-        seen = [shape.focused(number) for number in range(2)]
+        union = Union.of(mesh, self._regions, tied)
+        seen = [shape.focused(number) for number in self.pair]
         prescribed, target = self._prescribed(seen)
         if placed is not None:
             prescribed[placed] = True
             target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
-        forces = None if self.forces is None else union.summed(mesh.body, self.forces)
+        inside = union.inside
+        forces = None if self.forces is None else union.summed(inside, self.forces[inside])
+        target_J = [grown.bodies[number].strained[1] for number in self.pair]
         nodes = union.nodes
         rest = growth.equilibrium(
-            self._solid(union), mesh.by_triangle([body.strained[1] for body in grown.bodies]),
+            self._solid(union), mesh.by_triangle(target_J, self._regions),
             shape.mesh.points[nodes], shape.pressure[nodes[: union.corners]], prescribed[nodes],
             target[nodes], forces=forces, supports=self._supports(seen, union),
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
         points = shape.mesh.points.copy()
-        points[mesh.body] = rest.position[union.number[mesh.body]]
+        points[inside] = rest.position[union.number[inside]]
         pressure = shape.pressure.copy()
-        corners = mesh.topology.body_corners
+        corners = inside[inside < mesh.corners]
         pressure[corners] = rest.pressure[union.number[corners]]
         return replace(shape.moved(points), pressure=pressure)
 
@@ -393,14 +417,15 @@ class Welding:
         mesh = self.grown.mesh
         reference = mesh.points.copy()
         in_triangles = []
-        for region, body in zip(mesh.regions, self.grown.bodies):
-            own = body.strained[0].reference
+        for region, number in zip(self._regions, self.pair):
+            own = self.grown.bodies[number].strained[0].reference
             in_triangles.append(own[region.own_cells])
             reference[region.nodes] = own
         shape = Shape(union.cells, union.corners, self.grown.space.gradient_degree,
                       mesh.topology.method)
-        return WeldedSolid(shape, reference[union.nodes], energy=self.grown.bodies[0].solid.energy,
-                           in_triangles=mesh.by_triangle(in_triangles))
+        energy = self.grown.bodies[self.pair[0]].solid.energy
+        return WeldedSolid(shape, reference[union.nodes], energy=energy,
+                           in_triangles=mesh.by_triangle(in_triangles, self._regions))
 
     def _prescribed(self, seen: Sequence[Pore]) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) True where a coordinate of a node is prescribed, and (N, 2) um, positions of the
@@ -408,7 +433,7 @@ class Welding:
         mesh = self.grown.mesh
         prescribed = np.zeros((len(mesh.points), 2), bool)
         target = seen[0].mesh.points.copy()
-        for number, (region, shape) in enumerate(zip(mesh.regions, seen)):
+        for number, region, shape in zip(self.pair, self._regions, seen):
             locked, places = constraints(self.grown.focused(number), shape)
             prescribed[region.nodes] |= locked
             target[region.nodes] = np.where(locked, places, target[region.nodes])
@@ -417,8 +442,8 @@ class Welding:
     def _supports(self, seen: Sequence[Pore], union: Union) -> list[Support]:
         """The supports of all contact surfaces; seen: as for :meth:`_prescribed`."""
         supports = []
-        for region, body, shape in zip(self.grown.mesh.regions, self.grown.bodies, seen):
-            solid, _ = body.strained
+        for number, region, shape in zip(self.pair, self._regions, seen):
+            solid, _ = self.grown.bodies[number].strained
             supports += [Support(int(union.number[region.nodes[support.point]]),
                                  union.summed(region.nodes, support.load))
                          for support in surface_supports(solid, shape)]
@@ -442,11 +467,9 @@ class Welding:
 
     def _marked(self, shape: Pore) -> Pore:
         """The pore with the nodes that have joined marked as welded."""
-        pairs = self._tied()
-        bodies = [replace(body, wall=np.where(np.isin(loop, pairs[:, number]), WELD, body.wall))
-                  for number, (body, loop) in enumerate(zip(shape.bodies,
-                                                            shape.mesh.topology.loops))]
-        marked = replace(shape, bodies=tuple(bodies))
-        for number in range(2):
-            marked = with_new_surfaces(marked.focused(number))
-        return marked.focused(None)
+        for number, loop, tied in zip(self.pair, self._loops, self._tied().T):
+            seen = shape.focused(number)
+            weld = welds.weld_of(seen.body.wall)
+            marked = seen.with_body(wall=np.where(np.isin(loop, tied), weld, seen.body.wall))
+            shape = with_new_surfaces(marked)
+        return shape.focused(None)

@@ -618,13 +618,13 @@ class Scene:
 
     @property
     def without_weld(self) -> str:
-        """Why aggregates that meet end the run; empty if they join."""
+        """Why aggregates that meet end the run; empty if two on opposite walls join."""
         growth = self.growing.growth
         scheme = self.numerics.scheme
-        opposite = sorted(seed.wall for seed in self.aggregates) == ["lower", "upper"]
+        walls = {seed.wall for seed in self.aggregates}
         reasons = {
             'growth.meeting is "end"': growth.meeting == "end",
-            "only two aggregates on opposite walls can join": not opposite,
+            "only two aggregates on opposite walls can join": len(walls) < 2,
             "a weld needs the curved elements and the midpoint rule of the preset fast":
                 not (scheme.controls_error and scheme.follows_layers),
             'growth.wall is "bonded"': growth.bonded,
