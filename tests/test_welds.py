@@ -139,10 +139,11 @@ def test_outlines_without_a_weld_stay_as_they_are():
 def test_aggregates_that_share_two_chains_of_nodes_are_refused():
     lower, _ = channel_walls(WIDTH)
     outline = half_disc(5.0, 4, 2, 0.0, lower)
-    other = replace(outline, points=outline.points + [0.0, 30.0])
-    shared = other.points.copy()
+    wall = outline.wall.copy()
+    wall[[3, 9]] = WELD
+    shared = outline.points + [0.0, 30.0]
     shared[[3, 9]] = outline.points[[3, 9]]
-    outlines = [outline, replace(other, points=shared)]
+    outlines = [replace(outline, wall=wall), replace(outline, points=shared, wall=wall)]
     with pytest.raises(MeshError, match="two aggregates touch at several places; a weld joins them at one place"):
         welds.united(outlines, welds.shared_points(outlines)[1])
 
@@ -187,7 +188,7 @@ def test_welded_aggregates_are_the_mirror_image_of_one_at_a_plane_of_symmetry(na
     whole, half = reports_of(*scene)[-1], reports_of(*HALF)[-1]
     assert [body.name for body in whole.pore.bodies] == names
     outline = half.pore.outline
-    assert whole.pore.welded and half.pore.contact and whole.pore.contact
+    assert whole.pore.welds == [(0, 1)] and half.pore.contact and whole.pore.contact
     assert whole.solved.flow.conductivity == pytest.approx(half.solved.flow.conductivity, rel=1e-2)
     for each in whole.pore.outlines:
         assert each.area == pytest.approx(outline.area, rel=1e-3)
@@ -252,7 +253,7 @@ def test_a_welded_aggregate_at_the_wall_of_the_other_one_is_an_end():
     for least in (2.0, 20.0):
         ends = Ends.of(with_film(least))
         event = nearest_end(ends, report.pore, report.solved)
-        assert (event.margin > 0) == (least > gap) and not event.joins
+        assert (event.margin > 0) == (least > gap) and event.joins is None
     assert event.margin == pytest.approx(1 - gap / 20.0, rel=1e-3)
     assert re.search(r"the wall of the other one is 1\d(\.\d)? um.* enclose water", str(event.end))
     assert is_over(str(event.end))
@@ -261,5 +262,5 @@ def test_a_welded_aggregate_at_the_wall_of_the_other_one_is_an_end():
 def test_a_film_at_a_wall_without_contact_stays_open():
     """It ends the run; a wedge beside a contact line closes."""
     pore = reports_of(*SCENE)[-1].pore
-    closing = welding.Welding(Mechanics.of(with_film(20.0)), pore, pore)
+    closing = welding.Welding(Mechanics.of(with_film(20.0)), pore, pore, (0, 1))
     assert not closing._closing(pore, 0).any()

@@ -173,13 +173,11 @@ def _along_arcs(nodes: np.ndarray) -> np.ndarray:
 class Union:
     """The nodes of two aggregates, with the two nodes of a tied pair as one.
 
-    inside: (m,) nodes of the aggregates in the mesh, ascending; nodes: (n,) of these, without the
-    second node of each tied pair; number: (N,) index in ``nodes`` of each node inside, or of the
-    node to which it is tied; cells: (t, k) triangles as indices into ``nodes``; corners: number of
-    corners among ``nodes``.
+    nodes: (n,) nodes of the mesh, ascending; number: (N,) index in ``nodes`` of each node of the
+    aggregates, or of the node to which it is tied; cells: (t, k) triangles as indices into
+    ``nodes``; corners: number of corners among ``nodes``.
     """
 
-    inside: np.ndarray
     nodes: np.ndarray
     number: np.ndarray
     cells: np.ndarray
@@ -192,8 +190,8 @@ class Union:
         alias[tied[:, 1]] = tied[:, 0]
         cells = mesh.by_triangle([region.cells for region in regions], regions)
         nodes, own_cells = np.unique(alias[cells], return_inverse=True)
-        return Union(np.unique(cells), nodes, np.searchsorted(nodes, alias),
-                     own_cells.reshape(cells.shape), int(np.count_nonzero(nodes < mesh.corners)))
+        return Union(nodes, np.searchsorted(nodes, alias), own_cells.reshape(cells.shape),
+                     int(np.count_nonzero(nodes < mesh.corners)))
 
     def summed(self, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
         """(n, ...) sums at the union's nodes of values (k, ...) at nodes (k,) of the mesh."""
@@ -261,7 +259,10 @@ class Welding:
 
         Raises GrowthError if there is no equilibrium or the weld does not come to rest.
         """
-        shape = replace(self.grown, space=self.start.space, pressure=self.start.pressure)
+        shape = self.grown  # other aggregates have their new shapes there
+        for number, region in zip(self.pair, self._regions):
+            shape = shape.focused(number).placed(self.start.mesh.points[region.nodes],
+                                                 self.start.pressure[region.corner_nodes])
         tied = np.empty((0, 2), int) if self.reach else self._tied()
         if not self.reach:
             for notch in self._notches:
@@ -395,22 +396,23 @@ class Welding:
         if placed is not None:
             prescribed[placed] = True
             target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
-        inside = union.inside
-        forces = None if self.forces is None else union.summed(inside, self.forces[inside])
-        target_J = [grown.bodies[number].strained[1] for number in self.pair]
         nodes = union.nodes
+        forces = None
+        if self.forces is not None:
+            total = self.forces.copy()
+            total[tied[:, 0]] += self.forces[tied[:, 1]]
+            forces = total[nodes]
+        target_J = [grown.bodies[number].strained[1] for number in self.pair]
         rest = growth.equilibrium(
             self._solid(union), mesh.by_triangle(target_J, self._regions),
             shape.mesh.points[nodes], shape.pressure[nodes[: union.corners]], prescribed[nodes],
             target[nodes], forces=forces, supports=self._supports(seen, union),
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
-        points = shape.mesh.points.copy()
-        points[inside] = rest.position[union.number[inside]]
-        pressure = shape.pressure.copy()
-        corners = inside[inside < mesh.corners]
-        pressure[corners] = rest.pressure[union.number[corners]]
-        return replace(shape.moved(points), pressure=pressure)
+        for number, region in zip(self.pair, self._regions):
+            shape = shape.focused(number).placed(rest.position[union.number[region.nodes]],
+                                                 rest.pressure[union.number[region.corner_nodes]])
+        return shape
 
     def _solid(self, union: Union) -> WeldedSolid:
         """The welded aggregates, with each triangle in the reference of its own aggregate."""
