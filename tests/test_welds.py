@@ -1,6 +1,6 @@
-"""Two aggregates that meet and weld: their outlines, one step against a plane of symmetry, masses, the strain of each
-side, and scenes without a weld. The case coupling-weld follows the mirror image further, and `test_longer.py` resumes a
-run with a weld."""
+"""Two aggregates that meet and weld: their outlines, one step against a plane of symmetry, masses, the strain of
+each side, scenes without a weld, and welds among further aggregates. The case coupling-weld follows the mirror image
+further, and `test_longer.py` resumes a run with a weld."""
 
 import re
 from dataclasses import replace
@@ -13,8 +13,8 @@ import repro
 from repro.errors import GrowthError, MeshError
 from repro.fem import welds
 from repro.fem.outline import half_disc
-from repro.fem.walls import WELD, channel_walls
-from repro.march.ends import Ends, nearest_end
+from repro.fem.walls import FREE, WELD, channel_walls
+from repro.march.ends import Ends, _apart, _meetings, nearest_end
 from repro.model import welding
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import sized
@@ -31,8 +31,14 @@ EXCHANGED = tuple(f"aggregate=[{UPPER}, {LOWER}]" if LOWER in change else change
 HALF = (*COMMON, 'aggregate.radius="13.8 um"', f'pore.width="{WIDTH / 2} um"', 'pore.upper_wall="symmetry"')
 
 
+#: A third aggregate far downstream, and two more that weld there; they end earlier.
+FAR = '{name="far", radius="4 um", position="250 um"}'
+FAR_LOWER, FAR_UPPER = (seed.replace('name="', 'position="250 um", name="far-') for seed in (LOWER, UPPER))
+SHORT = ('growth.end="0.25 h"', 'output.times=["0.25 h"]', 'pore.length="800 um"', f'pore.width="{WIDTH} um"')
+
+
 def scene_of(*changes):
-    return load_scene("base", [*changes, f'output.times=["{END} h"]'], unset=["flow.head"])
+    return load_scene("base", [f'output.times=["{END} h"]', *changes], unset=["flow.head"])
 
 
 @cache
@@ -264,3 +270,62 @@ def test_a_film_at_a_wall_without_contact_stays_open():
     pore = reports_of(*SCENE)[-1].pore
     closing = welding.Welding(Mechanics.of(with_film(20.0)), pore, pore, (0, 1))
     assert not closing._closing(pore, 0).any()
+
+
+# ---------------------------------------------------------------- more than two
+
+
+def last_of(*seeds):
+    """The last report of a run with these seeds."""
+    return reports_of(*COMMON, *SHORT, f"aggregate=[{', '.join(seeds)}]")[-1]
+
+
+def columns_of(report, name):
+    """Area, thickness, tips and contact length of an aggregate, and the length of its weld."""
+    number = [body.name for body in report.pore.bodies].index(name)
+    outline = report.pore.outlines[number]
+    wall = report.pore.mesh.walls[outline.seat.wall - 1]
+    return [outline.area, outline.thickness, outline.upstream, outline.downstream, outline.contact_length(wall),
+            float(np.ptp(outline.points[outline.wall >= WELD, 0]))]
+
+
+def assert_keep_their_mass(pore):
+    """The area of each aggregate is its mass over X_m, as one pair has it: J = theta in the mean."""
+    density = scene_of(*SCENE).kinetics.maximum_density
+    areas = np.array([outline.area for outline in pore.outlines])
+    assert areas == pytest.approx([body.mass / density for body in pore.bodies], rel=1e-4)
+
+
+@pytest.mark.parametrize("seeds, weld", [((FAR, LOWER, UPPER), (1, 2)), ((LOWER, FAR, UPPER), (0, 2)),
+                                         ((UPPER, LOWER, FAR), (0, 1))], ids=["first", "in the middle", "last"])
+def test_a_third_aggregate_far_away_leaves_a_weld_as_it_is(seeds, weld):
+    """Wherever it is in the list. The bound is the tolerance of the preset."""
+    two, three = last_of(LOWER, UPPER), last_of(*seeds)
+    assert three.pore.welds == [weld] and two.pore.welds == [(0, 1)]
+    for name in ("low", "high"):
+        assert columns_of(three, name) == pytest.approx(columns_of(two, name), rel=scene_of(*SCENE).numerics.tolerance)
+    assert_keep_their_mass(three.pore)
+    events = list(_meetings(Ends.of(scene_of(*COMMON, *SHORT, f"aggregate=[{', '.join(seeds)}]")), three.pore))
+    assert len(events) == 4 and not any(event.joins for event in events), "two films at the third one, two enclosures"
+    assert all("far" in str(event.end) for event in events[:2])
+
+
+def test_several_pairs_weld_one_after_the_other():
+    """The pair upstream is that of a run with two. Each weld has its own number."""
+    two, four = last_of(LOWER, UPPER), last_of(LOWER, FAR_UPPER, UPPER, FAR_LOWER)
+    assert four.pore.welds == [(0, 2), (1, 3)]
+    assert [body.wall.max() for body in four.pore.bodies] == [WELD, WELD + 1, WELD, WELD + 1]
+    assert four.pore.groups == [(0, 2), (1, 3)]
+    for name in ("low", "high"):
+        assert columns_of(four, name) == pytest.approx(columns_of(two, name), rel=scene_of(*SCENE).numerics.tolerance)
+    assert_keep_their_mass(four.pore)
+
+
+def test_aggregates_that_meet_say_why_they_do_not_join():
+    low, far_high, high, far_low = last_of(LOWER, FAR_UPPER, UPPER, FAR_LOWER).pore.bodies
+    alone, other = (replace(body, wall=np.where(body.wall >= WELD, FREE, body.wall)) for body in (low, far_high))
+    spanning = reports_of(*HALF)[-1].pore.body
+    assert _apart(alone, other) == _apart(other, alone) == ""
+    assert _apart(alone, far_low) == "only two aggregates on opposite walls can join"
+    assert _apart(alone, far_high) == _apart(far_high, alone) == "aggregate far-high is welded to another one"
+    assert _apart(spanning, other) == "aggregate 1 touches both walls"
