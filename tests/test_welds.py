@@ -220,13 +220,17 @@ def test_welded_aggregates_share_their_nodes_and_keep_their_own_strain():
         assert (body.theta * body.solid.at.dx).sum() == pytest.approx((J * body.solid.at.dx).sum(), rel=1e-4)
 
 
-def test_the_ledger_of_welded_aggregates_closes():
-    ledgers = [ledger for report in reports_of(*SCENE) for ledger in report.ledgers]
+def assert_closed(ledgers):
+    """The biomass of each step is that before it and what was made, and the next step begins with it."""
     assert len(ledgers) > 1
     for ledger in ledgers:
         assert ledger.biomass_after == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-12)
     for ledger, following in zip(ledgers, ledgers[1:]):
         assert following.biomass_before == pytest.approx(ledger.biomass_after, rel=1e-13)
+
+
+def test_the_ledger_of_welded_aggregates_closes():
+    assert_closed([ledger for report in reports_of(*SCENE) for ledger in report.ledgers])
 
 
 #: Changes of SCENE with which aggregates do not join, and the reason in the message of the run's end.
@@ -289,13 +293,6 @@ def columns_of(report, name):
             float(np.ptp(outline.points[outline.wall >= WELD, 0]))]
 
 
-def assert_keep_their_mass(pore):
-    """The area of each aggregate is its mass over X_m, as one pair has it: J = theta in the mean."""
-    density = scene_of(*SCENE).kinetics.maximum_density
-    areas = np.array([outline.area for outline in pore.outlines])
-    assert areas == pytest.approx([body.mass / density for body in pore.bodies], rel=1e-4)
-
-
 @pytest.mark.parametrize("seeds, weld", [((FAR, LOWER, UPPER), (1, 2)), ((LOWER, FAR, UPPER), (0, 2)),
                                          ((UPPER, LOWER, FAR), (0, 1))], ids=["first", "in the middle", "last"])
 def test_a_third_aggregate_far_away_leaves_a_weld_as_it_is(seeds, weld):
@@ -304,7 +301,7 @@ def test_a_third_aggregate_far_away_leaves_a_weld_as_it_is(seeds, weld):
     assert three.pore.welds == [weld] and two.pore.welds == [(0, 1)]
     for name in ("low", "high"):
         assert columns_of(three, name) == pytest.approx(columns_of(two, name), rel=scene_of(*SCENE).numerics.tolerance)
-    assert_keep_their_mass(three.pore)
+    assert_closed(three.ledgers)
     events = list(_meetings(Ends.of(scene_of(*COMMON, *SHORT, f"aggregate=[{', '.join(seeds)}]")), three.pore))
     assert len(events) == 4 and not any(event.joins for event in events), "two films at the third one, two enclosures"
     assert all("far" in str(event.end) for event in events[:2])
@@ -318,7 +315,7 @@ def test_several_pairs_weld_one_after_the_other():
     assert four.pore.groups == [(0, 2), (1, 3)]
     for name in ("low", "high"):
         assert columns_of(four, name) == pytest.approx(columns_of(two, name), rel=scene_of(*SCENE).numerics.tolerance)
-    assert_keep_their_mass(four.pore)
+    assert_closed(four.ledgers)
 
 
 def test_aggregates_that_meet_say_why_they_do_not_join():
