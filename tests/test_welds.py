@@ -296,11 +296,15 @@ def columns_of(report, name):
 @pytest.mark.parametrize("seeds, weld", [((FAR, LOWER, UPPER), (1, 2)), ((LOWER, FAR, UPPER), (0, 2)),
                                          ((UPPER, LOWER, FAR), (0, 1))], ids=["first", "in the middle", "last"])
 def test_a_third_aggregate_far_away_leaves_a_weld_as_it_is(seeds, weld):
-    """Wherever it is in the list. The bound is the tolerance of the preset."""
+    """Wherever it is in the list. The bound is the tolerance of the preset. The third one is incompressible: its area
+    is its mass over X_m, to round-off."""
     two, three = last_of(LOWER, UPPER), last_of(*seeds)
     assert three.pore.welds == [weld] and two.pore.welds == [(0, 1)]
     for name in ("low", "high"):
         assert columns_of(three, name) == pytest.approx(columns_of(two, name), rel=scene_of(*SCENE).numerics.tolerance)
+    far = [body.name for body in three.pore.bodies].index("far")
+    mass = three.pore.bodies[far].mass / scene_of(*SCENE).kinetics.maximum_density
+    assert three.pore.outlines[far].area == pytest.approx(mass, rel=1e-9)
     assert_closed(three.ledgers)
     events = list(_meetings(Ends.of(scene_of(*COMMON, *SHORT, f"aggregate=[{', '.join(seeds)}]")), three.pore))
     assert len(events) == 4 and not any(event.joins for event in events), "two films at the third one, two enclosures"
