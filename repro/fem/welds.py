@@ -3,10 +3,10 @@
 Nodes of a weld have its number in both outlines, and the same coordinates to the last bit. The
 first weld has the number WELD, and each aggregate has at most one weld (:func:`pairs`). Each
 outline keeps its own coordinates at t = 0. An end of the weld is a line where the free surfaces of
-both aggregates meet and form a notch. The corners of the two surfaces are opposite: the k-th corner
-from the line on one surface is at about the same arc length as the k-th corner on the other
-surface. A new mesh gives both surfaces these corners (:func:`matched`), so that the weld can
-advance by nodes.
+both aggregates meet and form a notch, or the wall of both aggregates if they share it. The corners
+of the two surfaces are opposite: the k-th corner from the line on one surface is at about the same
+arc length as the k-th corner on the other surface. A new mesh gives both surfaces these corners
+(:func:`matched`), so that the weld can advance by nodes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
 from repro.fem.outline import ON_ARC, Outline, area_beside_chord, parabola
 from repro.fem.sizing import Sizing, placed
-from repro.fem.walls import FREE, WELD
+from repro.fem.walls import FREE, WELD, touched
 
 #: Corners of the two surfaces are opposite if their arc lengths from the line differ by at most
 #: this part of the shortest edge beside them. Below 1/2, no corner has two opposite corners.
@@ -42,8 +42,7 @@ ROUNDS = 12
 
 def weld_of(wall: np.ndarray) -> int:
     """Number of the weld of an aggregate, FREE without one; wall: (M,) as :attr:`Outline.wall`."""
-    largest = int(wall.max())
-    return largest if largest >= WELD else FREE
+    return int((wall - touched(wall)).max())
 
 
 def pairs(walls: Sequence[np.ndarray]) -> list[tuple[int, int]]:
@@ -92,7 +91,7 @@ def _around(one: tuple[Outline, np.ndarray],
     beyond = (begin + np.arange(len(of_second) - size)) % len(of_second)
     wall = np.concatenate([first.wall[around], second.wall[beyond]])
     both = Outline(np.concatenate([first.points[around], second.points[beyond]]),
-                   np.where(wall >= WELD, FREE, wall),
+                   touched(wall),
                    np.concatenate([first.fixed[around], second.fixed[beyond]]),
                    np.concatenate([first.origin[around], second.origin[beyond]]),
                    first.geometry, first.seat)
@@ -108,14 +107,15 @@ def ends_of(outline: Outline) -> tuple[int, int]:
 
 
 def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For both ends of a weld, the free nodes (k,) of either outline beyond the line.
+    """For each end of a weld off the walls, the free nodes (k,) of either outline beyond the line.
 
     The node of the line comes first.
     """
     start, end = ends_of(first)
     begin, last = ends_of(second)
-    return [(_free_from(first, end, 1), _free_from(second, begin, -1)),
+    both = [(_free_from(first, end, 1), _free_from(second, begin, -1)),
             (_free_from(first, start, -1), _free_from(second, last, 1))]
+    return [walks for walks in both if all(len(walk) > 1 for walk in walks)]
 
 
 def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
@@ -194,7 +194,7 @@ def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     if np.count_nonzero(outlines[0].wall >= WELD) == 1:
         return list(outlines)
     outlines = _matched(outlines, sizing)
-    for place in range(2):
+    for place in range(len(notches(*outlines))):
         walks = notches(*outlines)[place]
         lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
         reach = _reach(outlines, walks, lengths, MATCHED_FILMS * sizing.film)
@@ -366,21 +366,34 @@ def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
 
 def facing(first: Outline, second: Outline, reach: float, weld: int = WELD) -> list[Outline]:
     """The same curves with new corners: one at the point nearest to the other curve, marked as a
-    weld with the number ``weld``, and one at the arc length ``reach`` (um) on each side of it."""
+    weld with the number ``weld``, and one at the arc length ``reach`` (um) on each side of it.
+
+    The points are the contact lines between two aggregates on one wall."""
+    same_wall = first.seat.wall == second.seat.wall
+    places = [_line_beside(first, second), _line_beside(second, first)] if same_wall else (
+        _nearest(first, second))
     outlines = []
-    for outline, (edge, t) in zip((first, second), _nearest(first, second)):
+    for outline, (edge, t) in zip((first, second), places):
         edges = len(outline.points) // outline.geometry
         node = outline.geometry * ((edge + round(t)) % edges)
         if AT_CORNER < t < 1 - AT_CORNER:
             outline = cut(outline, [(edge, t)])
             node = outline.geometry * (edge + 1)
         wall = outline.wall.copy()
-        wall[node] = weld
+        wall[node] += weld
         outline = replace(outline, wall=wall)
         sides = [_free_from(outline, node, direction) for direction in (1, -1)]
-        outlines.append(cut(outline, [place for walk in sides
+        outlines.append(cut(outline, [place for walk in sides if len(walk) > 1
                                       for place in _places(outline, walk, np.array([reach]))]))
     return outlines
+
+
+def _line_beside(outline: Outline, other: Outline) -> tuple[int, float]:
+    """(edge, t) of the contact line, with the wall of the seed, that is nearest to another outline.
+    """
+    on = np.flatnonzero(outline.touches(outline.seat.wall))
+    apart = np.abs(outline.points[on, 0] - 0.5 * (other.upstream + other.downstream))
+    return int(on[np.argmin(apart)]) // outline.geometry, 0.0
 
 
 def _nearest(first: Outline, second: Outline) -> list[tuple[int, float]]:

@@ -51,7 +51,6 @@ from repro.march.folding import Fold, fold_message, most_compressed
 from repro.march.state import Compression, StepResult
 from repro.model import adhesion
 from repro.model.adhesion import Loading, Peak
-from repro.model.body import Body
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.scene import Pore as Channel
@@ -314,7 +313,7 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
     """The events of all pairs of aggregates."""
     least = ends.loading.growth.minimum_film
     for pair, film, (x, y) in _films(pore):
-        reason = ends.without_weld or _apart(*[pore.bodies[number] for number in pair])
+        reason = ends.without_weld or _apart(pore, pair, film)
         end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g}, "
                       f"y = {y:.4g} um the film between them is {film:.3g} um, and it closes below "
                       f"growth.minimum_film, {least:g} um; {reason}")
@@ -323,10 +322,12 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
         yield from _enclosures(least, pore, pair)
 
 
-def _apart(one: Body, other: Body) -> str:
-    """Why two aggregates that meet do not join; empty if they join."""
-    if one.seat.wall == other.seat.wall:
-        return "only two aggregates on opposite walls can join"
+def _apart(pore: Pore, pair: tuple[int, int], film: float) -> str:
+    """Why two aggregates that meet do not join; empty if they join; film: um, the least one between
+    them."""
+    one, other = (pore.bodies[number] for number in pair)
+    if one.seat.wall == other.seat.wall and _between_lines(pore, pair) > (1 + CLOSE) * film:
+        return "they would enclose water between them and their wall"
     for body in (one, other):
         if body.spans:
             beside = "is welded to another one" if weld_of(body.wall) else "touches both walls"
@@ -334,18 +335,27 @@ def _apart(one: Body, other: Body) -> str:
     return ""
 
 
+def _between_lines(pore: Pore, pair: tuple[int, int]) -> float:
+    """Distance (um) between the contact surfaces of two aggregates on one wall."""
+    first, second = (outline.points[outline.touches(outline.seat.wall), 0]
+                     for outline in (pore.outlines[number] for number in pair))
+    return float(max(first.min() - second.max(), second.min() - first.max()))
+
+
 def _enclosures(least: float, pore: Pore, pair: tuple[int, int]) -> Iterator[Event]:
-    """The events of two welded aggregates that reach the wall of the other one, which would enclose
-    water; least: um, growth.minimum_film."""
+    """The events of two welded aggregates that reach a further wall, where the model has no contact
+    for them; least: um, growth.minimum_film."""
+    opposite = len({pore.bodies[number].seat.wall for number in pair}) == 2
+    reason = ("this would enclose water beside their weld" if opposite else
+              "the model has no further contact of welded aggregates")
     for number in pair:
         outline = pore.outlines[number]
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
             end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g} um "
-                          f"the film between aggregate {pore.bodies[number].name} and the wall of "
-                          f"the other one is {film:.3g} um, and it closes below "
-                          f"growth.minimum_film, {least:g} um; this would enclose water beside "
-                          "their weld")
+                          f"the film between aggregate {pore.bodies[number].name} and the wall "
+                          f"y = {wall.y:g} um is {film:.3g} um, and it closes below "
+                          f"growth.minimum_film, {least:g} um; {reason}")
             yield Event(1 - film / least, end)
 
 

@@ -162,7 +162,7 @@ def fluid_loads(loading: Loading, pore: Pore, solved: Solved) -> tuple[Load, ...
 def _load(mesh: Mesh, outline: Outline, region: Region, forces: np.ndarray) -> Load:
     """Resultant of forces (n, 2) MPa um on the nodes of one aggregate."""
     seeded, *_ = outline.seat.walls(mesh.walls)
-    on = outline.points[outline.wall == seeded.number, 0]
+    on = outline.points[outline.touches(seeded.number), 0]
     x, y = (mesh.points[region.nodes] - [(on.min() + on.max()) / 2, seeded.y]).T
     moment = float(x @ forces[:, 1] - y @ forces[:, 0])
     return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)

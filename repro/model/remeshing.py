@@ -17,7 +17,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.transfer import Located
-from repro.fem.walls import touches_wall
+from repro.fem.walls import FREE, touched
 from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
 from repro.model.body import Body
@@ -118,7 +118,7 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     position = generated.at.field(old.points, old.cells[old.biomass])
     points = start.mesh.from_body(position, start.mesh.points)
     for body, region in zip(start.bodies, start.mesh.regions):
-        on_wall = region.loop[touches_wall(body.wall)]
+        on_wall = region.loop[touched(body.wall) != FREE]
         points[on_wall, 1] = start.mesh.points[on_wall, 1]
     mesh = moved_mesh(rules.meshing, start, start.moved(points))
     if mesh is None:

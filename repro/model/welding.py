@@ -27,7 +27,7 @@ from repro.fem.division import Division
 from repro.fem.forms import Basis, basis
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
-from repro.fem.walls import FREE, WELD
+from repro.fem.walls import FREE, WELD, touched
 from repro.model import growth, remeshing
 from repro.model.closing_by_lines import divided
 from repro.model.closing_by_nodes import closing_nodes
@@ -37,13 +37,12 @@ from repro.model.mechanics import (
     Expansion,
     Mechanics,
     constraints,
-    surface_supports,
     with_new_surfaces,
 )
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
 from repro.model.solid import Shape, Solid
-from repro.model.support import Support
+from repro.model.support import Support, lengths_along
 
 #: The last arc of a weld is halved until a part is shorter than this times numerics.tolerance of
 #: the arc: a sixteenth in ``fast``. Lengths then err by 0.8 % or less, and by up to 1.4 % with an
@@ -72,12 +71,29 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, in
     """
     film = mechanics.keys.minimum_film
     outlines = list(pore.outlines)
-    weld = max(WELD, 1 + max(int(outline.wall.max()) for outline in outlines))
+    weld = WELD + max(welds.weld_of(outline.wall) for outline in outlines)
     first, second = pair
     outlines[first], outlines[second] = welds.facing(outlines[first], outlines[second], film, weld)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
+    if pore.bodies[first].seat.wall == pore.bodies[second].seat.wall:
+        facing = _with_one_point(facing, pair)
     shape = Welding(mechanics, facing, facing, pair, reach=film).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
+
+
+def _with_one_point(pore: Pore, pair: tuple[int, int]) -> Pore:
+    """The contact surfaces of two aggregates on one wall become one surface, and its middle keeps
+    its place (2.3.3)."""
+    on = [outline.touches(outline.seat.wall) & (np.arange(len(outline.wall)) % 2 == 0)
+          for outline in (pore.outlines[number] for number in pair)]
+    x = [pore.outlines[number].points[:, 0] for number in pair]
+    along = np.concatenate([each[nodes] for each, nodes in zip(x, on)])
+    middle = 0.5 * (along.min() + along.max())
+    nearest = along[np.argmin(np.abs(along - middle))]
+    bodies = list(pore.bodies)
+    for number, nodes, each in zip(pair, on, x):
+        bodies[number] = replace(bodies[number], fixed=nodes & (each == nearest))
+    return replace(pore, bodies=tuple(bodies))
 
 
 @dataclass(eq=False)
@@ -444,11 +460,18 @@ class Welding:
     def _supports(self, seen: Sequence[Pore], union: Union) -> list[Support]:
         """The supports of all contact surfaces; seen: as for :meth:`_prescribed`."""
         supports = []
-        for number, region, shape in zip(self.pair, self._regions, seen):
-            solid, _ = self.grown.bodies[number].strained
-            supports += [Support(int(union.number[region.nodes[support.point]]),
-                                 union.summed(region.nodes, support.load))
-                         for support in surface_supports(solid, shape)]
+        for wall in self.grown.mesh.walls:
+            lengths = np.zeros(len(union.nodes))
+            points = []
+            for number, region, shape in zip(self.pair, self._regions, seen):
+                outline = shape.boundary
+                solid, _ = self.grown.bodies[number].strained
+                edges = region.own_loop[outline.edges_on(wall.number)]
+                lengths += union.summed(region.nodes, lengths_along(edges, solid.reference))
+                fixed = outline.fixed & outline.touches(wall.number)
+                points.extend(union.number[region.loop[fixed]].tolist())
+            if lengths.any() and points:
+                supports.append(Support(points[0], lengths / lengths.sum()))
         return supports
 
     def _closing(self, shape: Pore, number: int) -> np.ndarray:
@@ -459,7 +482,7 @@ class Welding:
         seen = shape.focused(number)
         outline = seen.boundary
         keys = self.mechanics.keys
-        touched = tuple(wall for wall in seen.walls if (outline.wall == wall.number).any())
+        touched = tuple(wall for wall in seen.walls if outline.touches(wall.number).any())
         wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle)
         if outline.geometry == 2:
             middles = wall[1::2]
@@ -472,6 +495,8 @@ class Welding:
         for number, loop, tied in zip(self.pair, self._loops, self._tied().T):
             seen = shape.focused(number)
             weld = welds.weld_of(seen.body.wall)
-            marked = seen.with_body(wall=np.where(np.isin(loop, tied), weld, seen.body.wall))
-            shape = with_new_surfaces(marked)
+            wall = seen.body.wall
+            marked = seen.with_body(wall=np.where(np.isin(loop, tied), touched(wall) + weld, wall))
+            one_wall = len({self.grown.bodies[each].seat.wall for each in self.pair}) == 1
+            shape = marked if one_wall else with_new_surfaces(marked)
         return shape.focused(None)

@@ -621,10 +621,8 @@ class Scene:
         """Why aggregates that meet end the run; empty if two on opposite walls join."""
         growth = self.growing.growth
         scheme = self.numerics.scheme
-        walls = {seed.wall for seed in self.aggregates}
         reasons = {
             'growth.meeting is "end"': growth.meeting == "end",
-            "only two aggregates on opposite walls can join": len(walls) < 2,
             "a weld needs the curved elements and the midpoint rule of the preset fast":
                 not (scheme.controls_error and scheme.follows_layers),
             'growth.wall is "bonded"': growth.bonded,
