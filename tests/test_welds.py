@@ -13,9 +13,9 @@ import repro
 from repro.errors import GrowthError, MeshError
 from repro.fem import welds
 from repro.fem.outline import half_disc
-from repro.fem.walls import FREE, WELD, channel_walls
+from repro.fem.walls import FREE, WELD, channel_walls, on_any
 from repro.march.ends import Ends, _apart, _meetings, nearest_end
-from repro.model import welding
+from repro.model import adhesion, welding
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import sized
 from repro.runs.status import is_over
@@ -240,7 +240,6 @@ WITHOUT = {
     "alone": (['aggregate={radius="5 um"}'], "only two aggregates on opposite walls can join"),
     "paper": (["numerics.preset=paper"], "a weld needs the curved elements and the midpoint rule of the preset fast"),
     "bonded": (["growth.wall=bonded"], 'growth.wall is "bonded"'),
-    "forces": (["growth.fluid_forces=included"], 'growth.fluid_forces is "included"'),
     "erosion": (["growth.new_biomass=stress_free", 'growth.erosion.speed="0.1 um/h"'], "the aggregates erode")}
 
 
@@ -251,8 +250,8 @@ def test_a_scene_says_why_its_aggregates_do_not_join(changes, reason):
 
 
 def test_a_meeting_without_a_weld_ends_the_run_with_the_reason():
-    scene = load_scene("base", [*SCENE, "growth.fluid_forces=included"], unset=["flow.head"])
-    with pytest.raises(repro.Meeting, match='2 um; growth.fluid_forces is "included"'):
+    scene = load_scene("base", [*SCENE, "growth.meeting=end"], unset=["flow.head"])
+    with pytest.raises(repro.Meeting, match='2 um; growth.meeting is "end"'):
         list(repro.simulate(scene))
 
 
@@ -279,9 +278,9 @@ def test_a_film_at_a_wall_without_contact_stays_open():
 # ---------------------------------------------------------------- more than two
 
 
-def last_of(*seeds):
+def last_of(*seeds, changes=()):
     """The last report of a run with these seeds."""
-    return reports_of(*COMMON, *SHORT, f"aggregate=[{', '.join(seeds)}]")[-1]
+    return reports_of(*COMMON, *SHORT, f"aggregate=[{', '.join(seeds)}]", *changes)[-1]
 
 
 def columns_of(report, name):
@@ -309,6 +308,28 @@ def test_a_third_aggregate_far_away_leaves_a_weld_as_it_is(seeds, weld):
     events = list(_meetings(Ends.of(scene_of(*COMMON, *SHORT, f"aggregate=[{', '.join(seeds)}]")), three.pore))
     assert len(events) == 4 and not any(event.joins for event in events), "two films at the third one, two enclosures"
     assert all("far" in str(event.end) for event in events[:2])
+
+
+def test_welded_aggregates_are_in_equilibrium_with_the_forces_of_the_water():
+    """Off the walls the forces of growth and of the water add up to zero, at weld nodes those of both aggregates. The
+    water's forces are those of the flow in the last shape, so a few percent of them remain."""
+    report = last_of(LOWER, UPPER, changes=("growth.fluid_forces=included",))
+    loading = adhesion.Loading.of(scene_of(*SCENE, "growth.fluid_forces=included"))
+    for pore, solved in ((report.pore, report.solved), adhesion.at_rest(loading, report.pore, report.solved)):
+        mesh = pore.mesh
+        off = ~on_any(mesh.walls, mesh.points[mesh.body])
+        water = adhesion.fluid_forces(loading, pore, solved)[off]
+        assert pore.welds and np.abs(water).max() > 1e-5
+        assert np.abs(adhesion.wall_forces(loading, pore, solved)[off]).max() < 0.1 * np.abs(water).max()
+
+
+def test_the_water_does_not_move_stiff_welded_aggregates():
+    """A thousand times as stiff, they grow as without forces: mu_L alone has no effect then."""
+    stiff = last_of(LOWER, UPPER, changes=("growth.fluid_forces=included", 'growth.shear_modulus="10 MPa"'))
+    free = last_of(LOWER, UPPER)
+    assert stiff.pore.welds == free.pore.welds
+    for name in ("low", "high"):
+        assert columns_of(stiff, name) == pytest.approx(columns_of(free, name), rel=1e-6)
 
 
 def test_several_pairs_weld_one_after_the_other():

@@ -227,9 +227,10 @@ def _after_detachment(stages: Stages, reached: Reached,
 
 def _after_meeting(stages: Stages, reached: Reached,
                    pair: tuple[int, int]) -> tuple[StepResult, Solved]:
-    """Return the state just after the two aggregates with the indices ``pair`` have joined."""
+    """Return the state just after two aggregates have joined; pair: their indices."""
     step = reached.step
-    after, solved = stages.grading.solve(stages.weld(step.pore, pair, reached.solved))
+    welded = stages.weld(step.pore, pair, reached.solved)
+    after, solved = settle(stages, *stages.grading.solve(welded))
     ledger = replace(step.ledger, biomass_after=after.mass)
     return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 

@@ -176,7 +176,7 @@ def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
     mesh = pore.mesh
     nodal = np.zeros_like(mesh.points)
     for body, region in zip(pore.bodies, mesh.regions):
-        nodal[region.nodes] = growth.internal_forces(
+        nodal[region.nodes] += growth.internal_forces(
             body.solid, body.theta, mesh.points[region.nodes], pore.pressure[region.corner_nodes])
     forces = loading.growth.shear_modulus * nodal[mesh.body]
     if loading.growth.has_fluid_forces:

@@ -64,7 +64,7 @@ class WeldedSolid(Solid):
 
 def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, int],
          speed: float) -> Pore:
-    """The pore after two aggregates have met and joined; pair: their indices.
+    """The pore after two aggregates have met and joined, without fluid forces; pair: their indices.
 
     The weld extends by the thickness of the least film on each side of the nearest points. speed:
     as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
@@ -348,6 +348,7 @@ class Welding:
             grown = grown.focused(number).with_body(wall=rest.wall, fixed=rest.fixed)
         points = shape.mesh.points
         pressure = shape.pressure
+        forces = self.forces
         divisions = []
         for side, number in enumerate(self.pair):
             arcs, at = zip(*[self._last_arc(k, side, part) for k, part in zip(inside, t)])
@@ -358,9 +359,10 @@ class Welding:
             grown = divided(grown.focused(number), division, contact)
             points = division.nodal(points)
             pressure = division.at_corners(pressure)
+            forces = None if forces is None else division.divided_loads(forces)
             divisions.append(division)
         start = replace(grown.moved(points), pressure=pressure)
-        trial = replace(self, grown=grown, start=start)
+        trial = replace(self, grown=grown, start=start, forces=forces)
         for k, notch in enumerate(self._notches):
             nodes = len(notch.pairs) + notch.size * (k in inside)
             walks = welds.notches(*trial._outlines)[k]
