@@ -196,11 +196,10 @@ def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     outlines = _matched(outlines, sizing)
     for place in range(len(notches(*outlines))):
         walks = notches(*outlines)[place]
-        lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
-        reach = _reach(outlines, walks, lengths, MATCHED_FILMS * sizing.film)
-        count = min(opposite_corners(*lengths), int(np.count_nonzero(lengths[0] <= reach)))
-        outlines = _without_small_edges(outlines, [walk[: 2 * count - 1] for walk in walks],
-                                        np.maximum(lengths[0][:count] - sizing.film, 0.0), sizing)
+        walks = in_notch(outlines, walks, sizing.film)
+        lengths = lengths_from(outlines[0], walks[0])
+        outlines = _without_small_edges(outlines, walks, np.maximum(lengths - sizing.film, 0.0),
+                                        sizing)
     along = _along_weld(*outlines)
     s = lengths_from(outlines[0], along[0])
     first, second = _without_small_edges(outlines, along, np.minimum(s, s[-1] - s), sizing)
@@ -314,6 +313,16 @@ def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
 def _line_size(sizing: Sizing) -> float:
     """Size (um) of the elements beside the ends of a weld."""
     return max(sizing.moving_lines, FINEST * sizing.film)
+
+
+def in_notch(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
+             film: float) -> list[np.ndarray]:
+    """The first nodes of ``walks`` on both outlines: those with opposite corners, as far as the
+    film between them is thinner than MATCHED_FILMS times the least one, ``film`` (um)."""
+    lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
+    reach = _reach(outlines, walks, lengths, MATCHED_FILMS * film)
+    count = min(opposite_corners(*lengths), int(np.count_nonzero(lengths[0] <= reach)))
+    return [walk[: 2 * count - 1] for walk in walks]
 
 
 def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:

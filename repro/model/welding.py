@@ -168,7 +168,7 @@ class Notch:
         normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         across = np.einsum("ki,ki->k", normal, before[1] - before[0])
-        normal *= np.sign(across[np.argmax(np.abs(across))])
+        normal *= np.sign(across[1])
         gap = np.einsum("ki,ki->k", normal, two - one)[1:]
         needs = np.minimum(self.film, self.slope * along)
         needs[along < ANGLE_FROM * (1 - ROUND_OFF) * self.film / self.slope] *= PART_OF_ANGLE
@@ -258,13 +258,12 @@ class Welding:
         """The notch with the nodes ``walks`` on both outlines (:func:`welds.notches`)."""
         mesh = self.grown.mesh
         keys = self.mechanics.keys
-        size = mesh.geometry
-        lengths = [welds.lengths_from(*each) for each in zip(self._outlines, walks)]
-        nodes = size * (welds.opposite_corners(*lengths) - 1) + 1
-        pairs = np.column_stack([loop[walk[:nodes]] for loop, walk in zip(self._loops, walks)])
-        return Notch(pairs, mesh.points[pairs], size, keys.minimum_film,
+        walks = welds.in_notch(self._outlines, walks, keys.minimum_film)
+        lengths = welds.lengths_from(self._outlines[0], walks[0])
+        pairs = np.column_stack([loop[walk] for loop, walk in zip(self._loops, walks)])
+        return Notch(pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
                      np.tan(keys.minimum_contact_angle),
-                     int(np.abs(lengths[0] - self.reach).argmin()))
+                     int(np.abs(lengths - self.reach).argmin()))
 
     def equilibrium(self) -> Pore:
         """The equilibrium with the weld and the contact of ``start``."""
