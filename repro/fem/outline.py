@@ -72,6 +72,10 @@ class Outline:
         """(M,) True at the nodes on a wall; wall: its number."""
         return touched(self.wall) == wall
 
+    def welded(self, weld: int) -> np.ndarray:
+        """(M,) True at the nodes of a weld; weld: its number."""
+        return self.wall - touched(self.wall) == weld
+
     def nearest(self, wall: Wall) -> tuple[float, float]:
         """Least thickness (um) of the film at a wall, and x (um) of its thinnest point."""
         points = self._extreme_points

@@ -1,8 +1,8 @@
 """Welded aggregates: their boundaries share the nodes of the weld.
 
 Nodes of a weld have its number in both outlines, and the same coordinates to the last bit. The
-first weld has the number WELD, and each aggregate has at most one weld (:func:`pairs`). Each
-outline keeps its own coordinates at t = 0. An end of the weld is a line where the free surfaces of
+first weld has the number WELD. An aggregate may have several welds (:func:`pairs`). Each outline
+keeps its own coordinates at t = 0. An end of the weld is a line where the free surfaces of
 both aggregates meet and form a notch, or the wall of both aggregates if they share it. The corners
 of the two surfaces are opposite: the k-th corner from the line on one surface is at about the same
 arc length as the k-th corner on the other surface. A new mesh gives both surfaces these corners
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -40,16 +41,22 @@ AT_CORNER = 0.05
 ROUNDS = 12
 
 
-def weld_of(wall: np.ndarray) -> int:
-    """Number of the weld of an aggregate, FREE without one; wall: (M,) as :attr:`Outline.wall`."""
-    return int((wall - touched(wall)).max())
+def welds_of(wall: np.ndarray) -> set[int]:
+    """Numbers of the welds of an aggregate; wall: (M,) as :attr:`Outline.wall`."""
+    return set((wall - touched(wall)).tolist()) - {FREE}
 
 
 def pairs(walls: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     """Indices of the two aggregates of each weld; walls: (M,) :attr:`Outline.wall` of each."""
-    numbers = [weld_of(wall) for wall in walls]
-    return [(first, numbers.index(number, first + 1)) for first, number in enumerate(numbers)
-            if number != FREE and number not in numbers[:first]]
+    of = [welds_of(wall) for wall in walls]
+    return [(first, second) for first, second in combinations(range(len(of)), 2)
+            if of[first] & of[second]]
+
+
+def common(first: Outline, second: Outline) -> int:
+    """Number of the weld of two outlines."""
+    weld, = welds_of(first.wall) & welds_of(second.wall)
+    return weld
 
 
 def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -69,9 +76,12 @@ def united(outlines: Sequence[Outline],
     MeshError if two aggregates share more than one chain of nodes.
     """
     left = dict(enumerate(zip(outlines, own)))
+    part_of = list(left)
     for first, second in pairs([outline.wall for outline in outlines]):
         if np.isin(own[first], own[second]).any():  # not if they have just met
-            left[first] = _around(left[first], left.pop(second))
+            whole, part = sorted([part_of[first], part_of[second]])
+            left[whole] = _around(left[whole], left.pop(part))
+            part_of = [whole if each == part else each for each in part_of]
     return [outline for outline, _ in left.values()], [nodes for _, nodes in left.values()]
 
 
@@ -98,11 +108,11 @@ def _around(one: tuple[Outline, np.ndarray],
     return both, np.concatenate([first_own[around], second_own[beyond]])
 
 
-def ends_of(outline: Outline) -> tuple[int, int]:
-    """The first and the last node of an outline's weld, along its loop."""
-    weld = outline.wall >= WELD
-    first = np.flatnonzero(weld & ~np.roll(weld, 1))[0]
-    last = np.flatnonzero(weld & ~np.roll(weld, -1))[0]
+def ends_of(outline: Outline, weld: int) -> tuple[int, int]:
+    """The first and the last node of one of an outline's welds, along its loop."""
+    on = outline.welded(weld)
+    first = np.flatnonzero(on & ~np.roll(on, 1))[0]
+    last = np.flatnonzero(on & ~np.roll(on, -1))[0]
     return int(first), int(last)
 
 
@@ -111,8 +121,9 @@ def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarra
 
     The node of the line comes first.
     """
-    start, end = ends_of(first)
-    begin, last = ends_of(second)
+    weld = common(first, second)
+    start, end = ends_of(first, weld)
+    begin, last = ends_of(second, weld)
     both = [(_free_from(first, end, 1), _free_from(second, begin, -1)),
             (_free_from(first, start, -1), _free_from(second, last, 1))]
     return [walks for walks in both if all(len(walk) > 1 for walk in walks)]
@@ -161,8 +172,8 @@ def _of_each_pair(change: Callable[[Sequence[Outline], Sizing], Sequence[Outline
     """The outlines after a ``change`` of each two that are welded."""
     changed = list(outlines)
     for pair in pairs([outline.wall for outline in outlines]):
-        others = tuple(each.corners for k, each in enumerate(outlines) if k not in pair)
-        welded = change([outlines[k] for k in pair], replace(sizing, others=others))
+        others = tuple(each.corners for k, each in enumerate(changed) if k not in pair)
+        welded = change([changed[k] for k in pair], replace(sizing, others=others))
         for k, outline in zip(pair, welded):
             changed[k] = outline
     return changed
@@ -191,12 +202,11 @@ def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
 
 def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     """:func:`coarsened` for two welded outlines."""
-    if np.count_nonzero(outlines[0].wall >= WELD) == 1:
+    if np.count_nonzero(outlines[0].welded(common(*outlines))) == 1:
         return list(outlines)
     outlines = _matched(outlines, sizing)
     for place in range(len(notches(*outlines))):
-        walks = notches(*outlines)[place]
-        walks = in_notch(outlines, walks, sizing.film)
+        walks = in_notch(outlines, notches(*outlines)[place], sizing.film)
         lengths = lengths_from(outlines[0], walks[0])
         outlines = _without_small_edges(outlines, walks, np.maximum(lengths - sizing.film, 0.0),
                                         sizing)
@@ -228,8 +238,9 @@ def _without_small_edges(outlines: Sequence[Outline], walks: Sequence[np.ndarray
 
 def _along_weld(first: Outline, second: Outline) -> tuple[np.ndarray, np.ndarray]:
     """(n,) nodes of the weld in either outline, in the order of the first one's loop."""
-    start, end = ends_of(first)
-    _, last = ends_of(second)
+    weld = common(first, second)
+    start, end = ends_of(first, weld)
+    _, last = ends_of(second, weld)
     steps = np.arange((end - start) % len(first.points) + 1)
     return (start + steps) % len(first.points), (last - steps) % len(second.points)
 
@@ -373,14 +384,16 @@ def cut(outline: Outline, places: Sequence[tuple[int, float]]) -> Outline:
     return placed(outline, every, np.concatenate(parts))
 
 
-def facing(first: Outline, second: Outline, reach: float, weld: int = WELD) -> list[Outline]:
+def facing(first: Outline, second: Outline, reach: float, weld: int = WELD,
+           wall: int = FREE) -> list[Outline]:
     """The same curves with new corners: one at the point nearest to the other curve, marked as a
     weld with the number ``weld``, and one at the arc length ``reach`` (um) on each side of it.
 
-    The points are the contact lines between two aggregates on one wall."""
-    same_wall = first.seat.wall == second.seat.wall
-    places = [_line_beside(first, second), _line_beside(second, first)] if same_wall else (
-        _nearest(first, second))
+    wall: number of the wall that both aggregates touch, if any; the points are then the contact
+    lines there that face each other.
+    """
+    places = _nearest(first, second) if wall == FREE else (
+        [_line_beside(first, second, wall), _line_beside(second, first, wall)])
     outlines = []
     for outline, (edge, t) in zip((first, second), places):
         edges = len(outline.points) // outline.geometry
@@ -388,19 +401,18 @@ def facing(first: Outline, second: Outline, reach: float, weld: int = WELD) -> l
         if AT_CORNER < t < 1 - AT_CORNER:
             outline = cut(outline, [(edge, t)])
             node = outline.geometry * (edge + 1)
-        wall = outline.wall.copy()
-        wall[node] += weld
-        outline = replace(outline, wall=wall)
+        numbers = outline.wall.copy()
+        numbers[node] += weld
+        outline = replace(outline, wall=numbers)
         sides = [_free_from(outline, node, direction) for direction in (1, -1)]
         outlines.append(cut(outline, [place for walk in sides if len(walk) > 1
                                       for place in _places(outline, walk, np.array([reach]))]))
     return outlines
 
 
-def _line_beside(outline: Outline, other: Outline) -> tuple[int, float]:
-    """(edge, t) of the contact line, with the wall of the seed, that is nearest to another outline.
-    """
-    on = np.flatnonzero(outline.touches(outline.seat.wall))
+def _line_beside(outline: Outline, other: Outline, wall: int) -> tuple[int, float]:
+    """(edge, t) of the contact line with a wall that is nearest to another outline."""
+    on = np.flatnonzero(outline.touches(wall))
     apart = np.abs(outline.points[on, 0] - 0.5 * (other.upstream + other.downstream))
     return int(on[np.argmin(apart)]) // outline.geometry, 0.0
 

@@ -46,7 +46,6 @@ import numpy as np
 from repro.errors import RunEnd, StageError
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_PORE
-from repro.fem.welds import weld_of
 from repro.march.folding import Fold, fold_message, most_compressed
 from repro.march.state import Compression, StepResult
 from repro.model import adhesion
@@ -318,44 +317,50 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
                       f"y = {y:.4g} um the film between them is {film:.3g} um, and it closes below "
                       f"growth.minimum_film, {least:g} um; {reason}")
         yield Event(1 - film / least, end, joins=None if reason else pair)
-    for pair in pore.welds:
-        yield from _enclosures(least, pore, pair)
+    for group in pore.groups:
+        if len(group) > 1:
+            yield from _further_contacts(least, pore, group)
 
 
 def _apart(pore: Pore, pair: tuple[int, int], film: float) -> str:
     """Why two aggregates that meet do not join; empty if they join; film: um, the least one between
-    them."""
-    one, other = (pore.bodies[number] for number in pair)
-    if one.seat.wall == other.seat.wall and _between_lines(pore, pair) > (1 + CLOSE) * film:
-        return "they would enclose water between them and their wall"
-    for body in (one, other):
-        if body.spans:
-            beside = "is welded to another one" if weld_of(body.wall) else "touches both walls"
-            return f"aggregate {body.name} {beside}"
+    them.
+
+    A weld must not enclose water. So the two, with those to which they are welded, have no wall in
+    common, or they meet at their only common wall.
+    """
+    if any({*pair} <= {*group} for group in pore.groups):
+        return "this would enclose water beside a weld"
+    walls = pore.common_walls(pair)
+    if len(walls) > 1 or walls and _between_lines(pore, pair, *walls) > (1 + CLOSE) * film:
+        return "this would enclose water between them and a wall"
     return ""
 
 
-def _between_lines(pore: Pore, pair: tuple[int, int]) -> float:
-    """Distance (um) between the contact surfaces of two aggregates on one wall."""
-    first, second = (outline.points[outline.touches(outline.seat.wall), 0]
-                     for outline in (pore.outlines[number] for number in pair))
+def _between_lines(pore: Pore, pair: tuple[int, int], wall: int) -> float:
+    """Distance (um) between the contact surfaces of two aggregates with a wall; infinite if they do
+    not both touch it."""
+    along = [outline.points[outline.touches(wall), 0]
+             for outline in (pore.outlines[number] for number in pair)]
+    if not all(map(len, along)):
+        return inf
+    first, second = along
     return float(max(first.min() - second.max(), second.min() - first.max()))
 
 
-def _enclosures(least: float, pore: Pore, pair: tuple[int, int]) -> Iterator[Event]:
-    """The events of two welded aggregates that reach a further wall, where the model has no contact
-    for them; least: um, growth.minimum_film."""
-    opposite = len({pore.bodies[number].seat.wall for number in pair}) == 2
-    reason = ("this would enclose water beside their weld" if opposite else
-              "the model has no further contact of welded aggregates")
-    for number in pair:
+def _further_contacts(least: float, pore: Pore, group: tuple[int, ...]) -> Iterator[Event]:
+    """The events of welded aggregates that reach a further wall, where the model has no contact for
+    them; group: their indices; least: um, growth.minimum_film."""
+    for number in group:
         outline = pore.outlines[number]
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
-            end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g} um "
-                          f"the film between aggregate {pore.bodies[number].name} and the wall "
-                          f"y = {wall.y:g} um is {film:.3g} um, and it closes below "
-                          f"growth.minimum_film, {least:g} um; {reason}")
+            touched = any(pore.outlines[other].touches(wall.number).any() for other in group)
+            reason = ("this would enclose water beside a weld" if touched else
+                      "the model has no further contact of welded aggregates")
+            end = Meeting(f"aggregate {pore.bodies[number].name} meets the wall y = {wall.y:g} um "
+                          f"at t = {pore.time:g} h: near x = {x:.4g} um the film is {film:.3g} um, "
+                          f"and it closes below growth.minimum_film, {least:g} um; {reason}")
             yield Event(1 - film / least, end)
 
 

@@ -80,9 +80,20 @@ class Pore:
 
     @property
     def groups(self) -> list[tuple[int, ...]]:
-        """Indices of the aggregates that move together: one alone, or the two of a weld."""
-        alone = set(range(len(self.bodies))).difference(*self.welds)
-        return sorted([*self.welds, *((number,) for number in alone)])
+        """Indices of the aggregates that move together: one alone, or all that are welded."""
+        group_of = list(range(len(self.bodies)))
+        for pair in self.welds:
+            first, second = sorted(group_of[number] for number in pair)
+            group_of = [first if group == second else group for group in group_of]
+        return [tuple(number for number, own in enumerate(group_of) if own == group)
+                for group in sorted(set(group_of))]
+
+    def common_walls(self, pair: tuple[int, int]) -> tuple[int, ...]:
+        """Numbers of the walls that the groups of two aggregates both touch."""
+        first, second = (next(group for group in self.groups if number in group) for number in pair)
+        return tuple(wall.number for wall in self.mesh.walls if all(
+            any(self.outlines[number].touches(wall.number).any() for number in group)
+            for group in (first, second)))
 
     @property
     def accumulates(self) -> bool:

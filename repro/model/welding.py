@@ -13,7 +13,7 @@ advance by nodes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -37,7 +37,6 @@ from repro.model.mechanics import (
     Expansion,
     Mechanics,
     constraints,
-    with_new_surfaces,
 )
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
@@ -64,35 +63,48 @@ class WeldedSolid(Solid):
 
 def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, int],
          speed: float) -> Pore:
-    """The pore after two aggregates have met and joined, without fluid forces; pair: their indices.
+    """The pore after two aggregates have met and joined; pair: their indices.
 
-    The weld extends by the thickness of the least film on each side of the nearest points. speed:
-    as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
+    The weld extends by the thickness of the least film on each side of the nearest points, or from
+    the wall that both aggregates touch. speed: as for :func:`remeshing.remesh`. Raises GrowthError
+    or MeshError.
     """
-    film = mechanics.keys.minimum_film
     outlines = list(pore.outlines)
-    weld = WELD + max(welds.weld_of(outline.wall) for outline in outlines)
+    weld = WELD + max([0, *(number for each in outlines for number in welds.welds_of(each.wall))])
     first, second = pair
-    outlines[first], outlines[second] = welds.facing(outlines[first], outlines[second], film, weld)
+    wall, = pore.common_walls(pair) or (FREE,)
+    outlines[first], outlines[second] = welds.facing(
+        outlines[first], outlines[second], mechanics.keys.minimum_film, weld, wall)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
-    if pore.bodies[first].seat.wall == pore.bodies[second].seat.wall:
-        facing = _with_one_point(facing, pair)
-    shape = Welding(mechanics, facing, facing, pair, reach=film).close()
+    group = next(group for group in facing.groups if first in group)
+    facing = with_one_point(facing, group)
+    shape = Welding(mechanics, facing, facing, group).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
 
 
-def _with_one_point(pore: Pore, pair: tuple[int, int]) -> Pore:
-    """The contact surfaces of two aggregates on one wall become one surface, and its middle keeps
-    its place (2.3.3)."""
-    on = [outline.touches(outline.seat.wall) & (np.arange(len(outline.wall)) % 2 == 0)
-          for outline in (pore.outlines[number] for number in pair)]
-    x = [pore.outlines[number].points[:, 0] for number in pair]
-    along = np.concatenate([each[nodes] for each, nodes in zip(x, on)])
-    middle = 0.5 * (along.min() + along.max())
-    nearest = along[np.argmin(np.abs(along - middle))]
-    bodies = list(pore.bodies)
-    for number, nodes, each in zip(pair, on, x):
-        bodies[number] = replace(bodies[number], fixed=nodes & (each == nearest))
+def with_one_point(pore: Pore, group: Sequence[int]) -> Pore:
+    """The pore with one fixed point on each wall that welded aggregates touch (2.3.3).
+
+    Their contact surfaces with one wall are one surface. If it has not exactly one fixed point, the
+    corner nearest to its middle becomes the point.
+    """
+    fixed = {number: pore.bodies[number].fixed for number in group}
+    for wall in pore.mesh.walls:
+        on = {number: pore.outlines[number].touches(wall.number) for number in group}
+        points = sum(np.count_nonzero(fixed[number] & on[number]) for number in group)
+        if points == 1 or not (wall.keeps_point and any(each.any() for each in on.values())):
+            continue
+        x = {number: np.where(on[number], pore.outlines[number].points[:, 0], np.nan)
+             for number in group}
+        along = np.concatenate([each[::pore.mesh.geometry] for each in x.values()])
+        middle = 0.5 * (np.nanmin(along) + np.nanmax(along))
+        nearest = along[np.nanargmin(np.abs(along - middle))]
+        chosen = next(number for number in group if (x[number] == nearest).any())
+        for number in group:
+            fixed[number] = np.where(on[number], (number == chosen) & (x[number] == nearest),
+                                     fixed[number])
+    bodies = [replace(body, fixed=fixed.get(number, body.fixed))
+              for number, body in enumerate(pore.bodies)]
     return replace(pore, bodies=tuple(bodies))
 
 
@@ -100,19 +112,23 @@ def _with_one_point(pore: Pore, pair: tuple[int, int]) -> Pore:
 class Notch:
     """The water at one end of a weld.
 
-    pairs: (k, 2) opposite nodes of the mesh, from the line on; before: (k, 2, 2) um, their
-    positions in the old shape; size: number of nodes from corner to corner; film: least film (um);
-    slope: tangent of the least angle; joined: number of pairs of corners beyond the old line that
-    have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
+    weld: its number; sides: its two aggregates, as indices into their group; pairs: (k, 2) opposite
+    nodes of the mesh, from the line on; before: (k, 2, 2) um, their positions in the old shape;
+    size: number of nodes from corner to corner; film: least film (um); slope: tangent of the least
+    angle; new: have the two aggregates just met? joined: number of pairs of corners beyond the old
+    line that have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
     thin; first_enough: smallest number for which no film is too thin; step: the next trial has
     at most this many pairs fewer.
     """
 
+    weld: int
+    sides: tuple[int, int]
     pairs: np.ndarray
     before: np.ndarray
     size: int
     film: float
     slope: float
+    new: bool
     joined: int = 0
     first_enough: float = inf
     step: int = 1
@@ -187,7 +203,7 @@ def _along_arcs(nodes: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """The nodes of two aggregates, with the two nodes of a tied pair as one.
+    """The nodes of welded aggregates, with the two nodes of a tied pair as one.
 
     nodes: (n,) nodes of the mesh, ascending; number: (N,) index in ``nodes`` of each node of the
     aggregates, or of the node to which it is tied; cells: (t, k) triangles as indices into
@@ -201,7 +217,7 @@ class Union:
 
     @staticmethod
     def of(mesh: Mesh, regions: Sequence[Region], tied: np.ndarray) -> Union:
-        """The union of the aggregates in two regions of a mesh; tied: (k, 2) pairs of nodes."""
+        """The union of the aggregates in regions of a mesh; tied: (k, 2) pairs of nodes."""
         alias = np.arange(len(mesh.points))
         alias[tied[:, 1]] = tied[:, 0]
         cells = mesh.by_triangle([region.cells for region in regions], regions)
@@ -218,52 +234,61 @@ class Union:
 
 @dataclass(eq=False)
 class Welding:
-    """Closing of the film between two aggregates that are welded, or that have just met.
+    """Closing of the films between aggregates that are welded, or that have just met.
 
     grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
-    shape and pressure from which the search starts; pair: indices of the two aggregates; forces:
-    (N, 2) um at the nodes of the mesh, over mu_L, None for no forces; reach: um, half of the first
-    length of the weld if the aggregates have just met, zero otherwise; patient: as in
+    shape and pressure from which the search starts; group: indices of the aggregates; forces:
+    (N, 2) um at the nodes of the mesh, over mu_L, None for no forces; patient: as in
     :class:`SearchOptions`.
     """
 
     mechanics: Mechanics
     grown: Pore
     start: Pore
-    pair: tuple[int, ...]
+    group: tuple[int, ...]
     forces: np.ndarray | None = None
-    reach: float = 0.0
     patient: bool = True
 
     def __post_init__(self) -> None:
         self._iterations = 0
-        self._notches = [self._notch(walks) for walks in welds.notches(*self._outlines)]
+        self._notches = [self._notch(sides, walks) for sides, walks in self._walks()]
 
     @property
     def _outlines(self) -> list[Outline]:
-        """The boundaries of both aggregates."""
-        return [self.grown.outlines[number] for number in self.pair]
+        """The boundaries of the aggregates."""
+        return [self.grown.outlines[number] for number in self.group]
 
     @property
     def _loops(self) -> list[np.ndarray]:
         """(M,) nodes of the boundary of each aggregate."""
-        return [self.grown.mesh.topology.loops[number] for number in self.pair]
+        return [self.grown.mesh.topology.loops[number] for number in self.group]
 
     @property
     def _regions(self) -> list[Region]:
-        """The regions of both aggregates."""
-        return [self.grown.mesh.regions[number] for number in self.pair]
+        """The regions of the aggregates."""
+        return [self.grown.mesh.regions[number] for number in self.group]
 
-    def _notch(self, walks: Sequence[np.ndarray]) -> Notch:
-        """The notch with the nodes ``walks`` on both outlines (:func:`welds.notches`)."""
+    def _walks(self) -> Iterator[tuple[tuple[int, int], Sequence[np.ndarray]]]:
+        """The two aggregates of each notch, and the nodes on both outlines (:func:`welds.notches`).
+        """
+        outlines = self._outlines
+        for first, second in welds.pairs([outline.wall for outline in outlines]):
+            for walks in welds.notches(outlines[first], outlines[second]):
+                yield (first, second), walks
+
+    def _notch(self, sides: tuple[int, int], walks: Sequence[np.ndarray]) -> Notch:
+        """The notch between two aggregates; walks: as :meth:`_walks` yields them."""
         mesh = self.grown.mesh
         keys = self.mechanics.keys
-        walks = welds.in_notch(self._outlines, walks, keys.minimum_film)
-        lengths = welds.lengths_from(self._outlines[0], walks[0])
-        pairs = np.column_stack([loop[walk] for loop, walk in zip(self._loops, walks)])
-        return Notch(pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
-                     np.tan(keys.minimum_contact_angle),
-                     int(np.abs(lengths - self.reach).argmin()))
+        outlines = [self._outlines[side] for side in sides]
+        weld = welds.common(*outlines)
+        new = np.count_nonzero(outlines[0].welded(weld)) == 1
+        walks = welds.in_notch(outlines, walks, keys.minimum_film)
+        lengths = welds.lengths_from(outlines[0], walks[0])
+        joined = int(np.abs(lengths - keys.minimum_film).argmin()) if new else 0
+        pairs = np.column_stack([self._loops[side][walk] for side, walk in zip(sides, walks)])
+        return Notch(weld, sides, pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
+                     np.tan(keys.minimum_contact_angle), new, joined)
 
     def equilibrium(self) -> Pore:
         """The equilibrium with the weld and the contact of ``start``."""
@@ -275,23 +300,23 @@ class Welding:
         Raises GrowthError if there is no equilibrium or the weld does not come to rest.
         """
         shape = self.grown  # other aggregates have their new shapes there
-        for number, region in zip(self.pair, self._regions):
+        for number, region in zip(self.group, self._regions):
             shape = shape.focused(number).placed(self.start.mesh.points[region.nodes],
                                                  self.start.pressure[region.corner_nodes])
-        tied = np.empty((0, 2), int) if self.reach else self._tied()
-        if not self.reach:
-            for notch in self._notches:
-                notch.predict(shape.mesh.points)
+        joined = [notch for notch in self._notches if not notch.new]
+        tied = np.concatenate([np.empty((0, 2), int), *(notch.tied for notch in joined)])
+        for notch in joined:
+            notch.predict(shape.mesh.points)
         for _ in range(CONTACT_ROUNDS):
             shape = self._joined(shape, tied)
             tied = self._tied()
             for notch in self._notches:
                 notch.advance(shape.mesh.points)
-            walls = [self._closing(shape, number) for number in self.pair]
+            walls = [self._closing(shape, number) for number in self.group]
             at_rest = np.array_equal(self._tied(), tied)
             if at_rest and not any((wall != FREE).any() for wall in walls):
                 return self._within_arcs(shape)
-            for number, wall in zip(self.pair, walls):
+            for number, wall in zip(self.group, walls):
                 seen = shape.focused(number)
                 shape = seen.with_body(wall=np.where(wall != FREE, wall, seen.body.wall))
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
@@ -303,7 +328,7 @@ class Welding:
         shorter weld, or if its films are too thin.
         """
         entire = Expansion(self._marked(shape), self._iterations)
-        inside = [k for k, notch in enumerate(self._notches) if notch.joined and not self.reach]
+        inside = [k for k, notch in enumerate(self._notches) if notch.joined and not notch.new]
         if not inside:
             return entire
         too_short = np.zeros(len(inside))
@@ -342,15 +367,19 @@ class Welding:
         surface.
         """
         grown = self.grown
-        for number in self.pair:
+        for number in self.group:
             rest = shape.bodies[number]
             grown = grown.focused(number).with_body(wall=rest.wall, fixed=rest.fixed)
         points = shape.mesh.points
         pressure = shape.pressure
         forces = self.forces
         divisions = []
-        for side, number in enumerate(self.pair):
-            arcs, at = zip(*[self._last_arc(k, side, part) for k, part in zip(inside, t)])
+        for side, number in enumerate(self.group):
+            own = [self._last_arc(k, side, part) for k, part in zip(inside, t)
+                   if side in self._notches[k].sides]
+            if not own:
+                continue
+            arcs, at = zip(*own)
             order = np.argsort(arcs)
             division = Division(grown.mesh, np.array(arcs)[order], np.array(at)[order], number)
             free = np.full(len(arcs), FREE)
@@ -362,21 +391,21 @@ class Welding:
             divisions.append(division)
         start = replace(grown.moved(points), pressure=pressure)
         trial = replace(self, grown=grown, start=start, forces=forces)
-        for k, notch in enumerate(self._notches):
+        for k, (notch, (sides, walks)) in enumerate(zip(self._notches, trial._walks())):
             nodes = len(notch.pairs) + notch.size * (k in inside)
-            walks = welds.notches(*trial._outlines)[k]
-            pairs = np.column_stack([loop[walk[:nodes]] for loop, walk in zip(trial._loops, walks)])
+            pairs = np.column_stack([trial._loops[side][walk[:nodes]]
+                                     for side, walk in zip(sides, walks)])
             trial._notches[k] = replace(notch, pairs=pairs, before=grown.mesh.points[pairs])
         return trial, start, tuple(divisions)
 
     def _last_arc(self, k: int, side: int, t: float) -> tuple[int, float]:
         """The last joined arc of a notch on one outline, and the place along the loop that is
         ``t`` along the arc from the line."""
-        middle = self._notches[k].pairs[2 * self._notches[k].joined - 1, side]
+        notch = self._notches[k]
+        middle, end = notch.tied[-2:, notch.sides.index(side)]
         loop = self._loops[side]
         node = int(np.flatnonzero(loop == middle)[0])
-        forward = loop[(node + 1) % len(loop)] == self._notches[k].pairs[
-            2 * self._notches[k].joined, side]
+        forward = loop[(node + 1) % len(loop)] == end
         return node // 2, t if forward else 1 - t
 
     def _tied(self) -> np.ndarray:
@@ -408,7 +437,7 @@ class Welding:
         grown = self.grown
         mesh = grown.mesh
         union = Union.of(mesh, self._regions, tied)
-        seen = [shape.focused(number) for number in self.pair]
+        seen = [shape.focused(number) for number in self.group]
         prescribed, target = self._prescribed(seen)
         if placed is not None:
             prescribed[placed] = True
@@ -419,14 +448,14 @@ class Welding:
             total = self.forces.copy()
             total[tied[:, 0]] += self.forces[tied[:, 1]]
             forces = total[nodes]
-        target_J = [grown.bodies[number].strained[1] for number in self.pair]
+        target_J = [grown.bodies[number].strained[1] for number in self.group]
         rest = growth.equilibrium(
             self._solid(union), mesh.by_triangle(target_J, self._regions),
             shape.mesh.points[nodes], shape.pressure[nodes[: union.corners]], prescribed[nodes],
             target[nodes], forces=forces, supports=self._supports(seen, union),
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
-        for number, region in zip(self.pair, self._regions):
+        for number, region in zip(self.group, self._regions):
             shape = shape.focused(number).placed(rest.position[union.number[region.nodes]],
                                                  rest.pressure[union.number[region.corner_nodes]])
         return shape
@@ -436,13 +465,13 @@ class Welding:
         mesh = self.grown.mesh
         reference = mesh.points.copy()
         in_triangles = []
-        for region, number in zip(self._regions, self.pair):
+        for region, number in zip(self._regions, self.group):
             own = self.grown.bodies[number].strained[0].reference
             in_triangles.append(own[region.own_cells])
             reference[region.nodes] = own
         shape = Shape(union.cells, union.corners, self.grown.space.gradient_degree,
                       mesh.topology.method)
-        energy = self.grown.bodies[self.pair[0]].solid.energy
+        energy = self.grown.bodies[self.group[0]].solid.energy
         return WeldedSolid(shape, reference[union.nodes], energy=energy,
                            in_triangles=mesh.by_triangle(in_triangles, self._regions))
 
@@ -452,7 +481,7 @@ class Welding:
         mesh = self.grown.mesh
         prescribed = np.zeros((len(mesh.points), 2), bool)
         target = seen[0].mesh.points.copy()
-        for number, region, shape in zip(self.pair, self._regions, seen):
+        for number, region, shape in zip(self.group, self._regions, seen):
             locked, places = constraints(self.grown.focused(number), shape)
             prescribed[region.nodes] |= locked
             target[region.nodes] = np.where(locked, places, target[region.nodes])
@@ -464,7 +493,7 @@ class Welding:
         for wall in self.grown.mesh.walls:
             lengths = np.zeros(len(union.nodes))
             points = []
-            for number, region, shape in zip(self.pair, self._regions, seen):
+            for number, region, shape in zip(self.group, self._regions, seen):
                 outline = shape.boundary
                 solid, _ = self.grown.bodies[number].strained
                 edges = region.own_loop[outline.edges_on(wall.number)]
@@ -493,11 +522,12 @@ class Welding:
 
     def _marked(self, shape: Pore) -> Pore:
         """The pore with the nodes that have joined marked as welded."""
-        for number, loop, tied in zip(self.pair, self._loops, self._tied().T):
+        for side, (number, loop) in enumerate(zip(self.group, self._loops)):
             seen = shape.focused(number)
-            weld = welds.weld_of(seen.body.wall)
             wall = seen.body.wall
-            marked = seen.with_body(wall=np.where(np.isin(loop, tied), touched(wall) + weld, wall))
-            one_wall = len({self.grown.bodies[each].seat.wall for each in self.pair}) == 1
-            shape = marked if one_wall else with_new_surfaces(marked)
-        return shape.focused(None)
+            for notch in self._notches:
+                if side in notch.sides:
+                    joined = np.isin(loop, notch.tied[:, notch.sides.index(side)])
+                    wall = np.where(joined, touched(wall) + notch.weld, wall)
+            shape = seen.with_body(wall=wall)
+        return with_one_point(shape.focused(None), self.group)
