@@ -358,9 +358,10 @@ def _further_contacts(least: float, pore: Pore, group: tuple[int, ...]) -> Itera
             touched = any(pore.outlines[other].touches(wall.number).any() for other in group)
             reason = ("this would enclose water beside a weld" if touched else
                       "the model has no further contact of welded aggregates")
-            end = Meeting(f"aggregate {pore.bodies[number].name} meets the wall y = {wall.y:g} um "
-                          f"at t = {pore.time:g} h: near x = {x:.4g} um the film is {film:.3g} um, "
-                          f"and it closes below growth.minimum_film, {least:g} um; {reason}")
+            end = Meeting(f"{_names(pore, group)} meet at t = {pore.time:g} h: near x = {x:.4g} um "
+                          f"the film between aggregate {pore.bodies[number].name} and the wall "
+                          f"y = {wall.y:g} um is {film:.3g} um, and it closes below "
+                          f"growth.minimum_film, {least:g} um; {reason}")
             yield Event(1 - film / least, end)
 
 
@@ -373,9 +374,9 @@ def _films(pore: Pore) -> Iterator[tuple[tuple[int, int], float, np.ndarray]]:
             yield pair, *one.film(other)
 
 
-def _names(pore: Pore, pair: tuple[int, int]) -> str:
-    """Names of two aggregates in messages."""
-    return "aggregates " + " and ".join(pore.bodies[number].name for number in pair)
+def _names(pore: Pore, numbers: tuple[int, ...]) -> str:
+    """Names of aggregates in messages."""
+    return "aggregates " + " and ".join(pore.bodies[number].name for number in numbers)
 
 
 def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: str, subject: str,

@@ -29,7 +29,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.walls import FREE, WELD, touched
 from repro.model import growth, remeshing
-from repro.model.closing_by_lines import divided
+from repro.model.closing_by_lines import FIRST_LENGTHS, divided
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF, Contact
 from repro.model.mechanics import (
@@ -66,19 +66,30 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, in
     """The pore after two aggregates have met and joined; pair: their indices.
 
     The weld extends by the thickness of the least film on each side of the nearest points, or from
-    the wall that both aggregates touch. speed: as for :func:`remeshing.remesh`. Raises GrowthError
-    or MeshError.
+    the wall that both aggregates touch; if there is then no equilibrium, by half of this length, or
+    a quarter. speed: as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
     """
+    for length in mechanics.keys.minimum_film * FIRST_LENGTHS:
+        try:
+            return _joined_along(mechanics, rules, pore, pair, speed, length)
+        except (GrowthError, LinearError) as error:
+            failure = error
+    raise failure
+
+
+def _joined_along(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, int],
+                  speed: float, length: float) -> Pore:
+    """:func:`join` with a weld that extends by a length (um)."""
     outlines = list(pore.outlines)
     weld = WELD + max([0, *(number for each in outlines for number in welds.welds_of(each.wall))])
     first, second = pair
     wall, = pore.common_walls(pair) or (FREE,)
     outlines[first], outlines[second] = welds.facing(
-        outlines[first], outlines[second], mechanics.keys.minimum_film, weld, wall)
+        outlines[first], outlines[second], length, weld, wall)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
     group = next(group for group in facing.groups if first in group)
     facing = with_one_point(facing, group)
-    shape = Welding(mechanics, facing, facing, group).close()
+    shape = Welding(mechanics, facing, facing, group, reach=length).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
 
 
@@ -238,8 +249,8 @@ class Welding:
 
     grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
     shape and pressure from which the search starts; group: indices of the aggregates; forces:
-    (N, 2) um at the nodes of the mesh, over mu_L, None for no forces; patient: as in
-    :class:`SearchOptions`.
+    (N, 2) um at the nodes of the mesh, over mu_L, None for no forces; reach: um, by which a new
+    weld extends on each side of its node; patient: as in :class:`SearchOptions`.
     """
 
     mechanics: Mechanics
@@ -247,6 +258,7 @@ class Welding:
     start: Pore
     group: tuple[int, ...]
     forces: np.ndarray | None = None
+    reach: float = 0.0
     patient: bool = True
 
     def __post_init__(self) -> None:
@@ -285,7 +297,7 @@ class Welding:
         new = np.count_nonzero(outlines[0].welded(weld)) == 1
         walks = welds.in_notch(outlines, walks, keys.minimum_film)
         lengths = welds.lengths_from(outlines[0], walks[0])
-        joined = int(np.abs(lengths - keys.minimum_film).argmin()) if new else 0
+        joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
         pairs = np.column_stack([self._loops[side][walk] for side, walk in zip(sides, walks)])
         return Notch(weld, sides, pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
                      np.tan(keys.minimum_contact_angle), new, joined)
