@@ -16,6 +16,7 @@ from repro.fem.outline import half_disc
 from repro.fem.walls import WELD, channel_walls, on_any
 from repro.march.ends import Ends, _apart, _meetings, nearest_end
 from repro.model import adhesion, welding
+from repro.model.contact import FORCE_REST
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import sized
 from repro.runs.status import is_over
@@ -312,16 +313,18 @@ def test_a_third_aggregate_far_away_leaves_a_weld_as_it_is(seeds, weld):
 
 
 def test_welded_aggregates_are_in_equilibrium_with_the_forces_of_the_water():
-    """Off the walls the forces of growth and of the water add up to zero, at weld nodes those of both aggregates. The
-    water's forces are those of the flow in the last shape, so a few percent of them remain."""
+    """Off the walls the forces of growth and of the water add up to zero, at weld nodes those of both aggregates: in
+    the run within a hundred times FORCE_REST. The equilibrium with small triangles at lines has the forces of the flow
+    before it, so a few percent of them remain there."""
     report = last_of(LOWER, UPPER, changes=("growth.fluid_forces=included",))
     loading = adhesion.Loading.of(scene_of(*SCENE, "growth.fluid_forces=included"))
-    for pore, solved in ((report.pore, report.solved), adhesion.at_rest(loading, report.pore, report.solved)):
+    rest = adhesion.at_rest(loading, report.pore, report.solved)
+    for (pore, solved), bound in (((report.pore, report.solved), 100 * FORCE_REST), (rest, 0.1)):
         mesh = pore.mesh
         off = ~on_any(mesh.walls, mesh.points[mesh.body])
         water = adhesion.fluid_forces(loading, pore, solved)[off]
         assert pore.welds and np.abs(water).max() > 1e-5
-        assert np.abs(adhesion.wall_forces(loading, pore, solved)[off]).max() < 0.1 * np.abs(water).max()
+        assert np.abs(adhesion.wall_forces(loading, pore, solved)[off]).max() < bound * np.abs(water).max()
 
 
 def test_the_water_does_not_move_stiff_welded_aggregates():

@@ -455,11 +455,8 @@ class Welding:
             prescribed[placed] = True
             target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
         nodes = union.nodes
-        forces = None
-        if self.forces is not None:
-            total = self.forces.copy()
-            total[tied[:, 0]] += self.forces[tied[:, 1]]
-            forces = total[nodes]
+        inside = np.unique(np.concatenate([region.nodes for region in self._regions]))
+        forces = None if self.forces is None else union.summed(inside, self.forces[inside])
         target_J = [grown.bodies[number].strained[1] for number in self.group]
         rest = growth.equilibrium(
             self._solid(union), mesh.by_triangle(target_J, self._regions),
