@@ -130,6 +130,7 @@ def test_each_aggregate_gets_the_growth_that_was_computed_for_it():
 def test_two_aggregates_that_meet_on_one_wall_end_the_run_there(order):
     """Where the film is as thin as the least one. The case coupling-meeting has opposite walls."""
     scene = load_scene("base", [f"numerics.preset={PRESET_OF[order]}", "numerics.refinement=0.4", "pore.width=40 um",
+                                "growth.meeting=end",
                                 'growth.end="40 h"', 'growth.minimum_film="4 um"', 'growth.time_step="0.5 h"'])
     seeds = (12.0, -15.0, BOTTOM), (10.0, 15.0, BOTTOM)
     reports = []

@@ -454,10 +454,11 @@ class Mesh:
         """(n, k) values at the nodes of one aggregate, from values at the nodes of all of them."""
         return values[np.searchsorted(self.body, region.nodes)]
 
-    def by_triangle(self, values: Sequence[np.ndarray]) -> np.ndarray:
-        """(T, ...) values in all biomass triangles in mesh order, from values (t, ...) in each
-        aggregate."""
-        triangles = np.concatenate([region.triangles for region in self.regions])
+    def by_triangle(self, values: Sequence[np.ndarray],
+                    regions: Sequence[Region] | None = None) -> np.ndarray:
+        """(T, ...) values in the triangles of aggregates in mesh order, from values (t, ...) in
+        each of them; regions: of the aggregates, all by default."""
+        triangles = np.concatenate([region.triangles for region in regions or self.regions])
         return np.concatenate(values)[np.argsort(triangles)]
 
     def moved(self, points: np.ndarray) -> Mesh:

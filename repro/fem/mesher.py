@@ -206,7 +206,7 @@ class _Fluid:
     def _order(self, wall: Wall) -> list[int]:
         """Aggregates that touch a wall, counterclockwise around the fluid."""
         touching = [number for number, outline in enumerate(self._outlines)
-                    if (outline.wall == wall.number).any()]
+                    if outline.touches(wall.number).any()]
         return sorted(touching, key=lambda number: wall.normal * self._point(number, wall, 0)[0])
 
     def polygons(self) -> list[Polygon]:
@@ -275,7 +275,7 @@ class _Fluid:
 
 def _contact(outline: Outline, wall: Wall) -> tuple[int, int]:
     """The outline's first and last node on a wall, in the direction of the fluid's boundary."""
-    nodes = np.flatnonzero(outline.wall == wall.number)
+    nodes = np.flatnonzero(outline.touches(wall.number))
     along = wall.normal * outline.points[nodes, 0]
     return int(nodes[np.argmin(along)]), int(nodes[np.argmax(along)])
 

@@ -16,7 +16,16 @@ import shapely
 
 from repro.errors import OutsidePore
 from repro.fem.brief import brief
-from repro.fem.walls import FREE, Seat, Wall, Walls, channel_walls, numbers_at, on_any
+from repro.fem.walls import (
+    FREE,
+    Seat,
+    Wall,
+    Walls,
+    channel_walls,
+    numbers_at,
+    on_any,
+    touched,
+)
 
 #: A corner of the shape at t = 0 keeps its node if the boundary turns there by more than this. The
 #: samples of a spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
@@ -31,9 +40,9 @@ ON_ARC = 16
 class Outline:
     """Boundary of the aggregate.
 
-    points: (M, 2) um; wall: (M,) number of the wall that each node touches, FREE or WELD; fixed:
-    (M,) True where x is always fixed; origin: (M, 2) um, position of each node's material at t = 0;
-    geometry: 1 for straight edges, 2 for arcs; seat: position of its seed.
+    points: (M, 2) um; wall: (M,) number of the wall that each node touches or of its weld, or FREE;
+    fixed: (M,) True where x is always fixed; origin: (M, 2) um, position of each node's material at
+    t = 0; geometry: 1 for straight edges, 2 for arcs; seat: position of its seed.
     """
 
     points: np.ndarray
@@ -56,8 +65,16 @@ class Outline:
     @property
     def thickness(self) -> float:
         """Largest distance (um) of the boundary from its seed's wall: the paper's R_aggregate."""
-        first = np.flatnonzero(self.wall == self.seat.wall)[0]
+        first = np.flatnonzero(self.touches(self.seat.wall))[0]
         return float(np.abs(self._extreme_points[:, 1] - self.points[first, 1]).max())
+
+    def touches(self, wall: int) -> np.ndarray:
+        """(M,) True at the nodes on a wall; wall: its number."""
+        return touched(self.wall) == wall
+
+    def welded(self, weld: int) -> np.ndarray:
+        """(M,) True at the nodes of a weld; weld: its number."""
+        return self.wall - touched(self.wall) == weld
 
     def nearest(self, wall: Wall) -> tuple[float, float]:
         """Least thickness (um) of the film at a wall, and x (um) of its thinnest point."""
@@ -67,7 +84,7 @@ class Outline:
 
     def untouched(self, walls: Walls) -> Walls:
         """The walls that no node touches; the nearest wall comes first."""
-        free = [wall for wall in walls if not (self.wall == wall.number).any()]
+        free = [wall for wall in walls if not self.touches(wall.number).any()]
         return tuple(sorted(free, key=lambda wall: self.nearest(wall)[0]))
 
     def gap(self, walls: Walls) -> float:
@@ -117,9 +134,10 @@ class Outline:
 
     @property
     def edge_wall(self) -> np.ndarray:
-        """The wall that each edge lies on; FREE where it borders the fluid."""
+        """Number of the wall that each edge lies on or of its weld; FREE where it borders the fluid.
+        """
         first, middle, last = self.arcs(self.wall).T
-        return np.where((first == last) & (middle == last), last, FREE).astype(int)
+        return np.where((first == middle) | (last == middle), middle, FREE).astype(int)
 
     def edges_on(self, wall: int) -> np.ndarray:
         """(e, 2 or 3) numbers of the nodes of each edge on a wall, along the loop."""
@@ -152,9 +170,12 @@ class Outline:
     def interface_edges(self) -> np.ndarray:
         """(M,) True where the line from node i to node i + 1 borders the fluid.
 
-        Such a line does not have both ends on one wall.
+        Such a line does not have both ends on one wall or weld.
         """
-        return (self.wall == FREE) | (self.wall != np.roll(self.wall, -1))
+        wall = touched(self.wall)
+        weld = self.wall - wall
+        along = [(each != FREE) & (each == np.roll(each, -1)) for each in (wall, weld)]
+        return ~np.any(along, axis=0)
 
     def arcs(self, values: np.ndarray) -> np.ndarray:
         """(edges, 3, ...) of nodal values (M, ...), at the start, middle and end of each edge."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, WELD, Walls, numbered, touches_wall, whole_width, width_between
+from repro.fem.walls import FREE, WELD, Walls, numbered, touched, whole_width, width_between
 
 #: Number of elements across the pore's width, across the aggregate's thickness and across a film.
 ACROSS_PORE = 14.0
@@ -130,7 +130,8 @@ def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
 
     Infinite without these lines.
     """
-    on = touches_wall(outline.wall) & (outline.wall != outline.seat.wall)
+    wall = touched(outline.wall)
+    on = (wall != FREE) & (wall != outline.seat.wall)
     if sizing.contact == inf or not on.any():
         return inf
     lines = outline.points[on & ~(np.roll(on, 1) & np.roll(on, -1))]
@@ -168,7 +169,7 @@ def each_beside(outlines: Sequence[Outline], sizing: Sizing) -> Iterator[tuple[O
     """Each outline with its element sizes, which depend on the corners of the other outlines."""
     for outline in outlines:
         others = tuple(other.corners for other in outlines if other is not outline)
-        yield outline, replace(sizing, others=others)
+        yield outline, replace(sizing, others=sizing.others + others)
 
 
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
@@ -178,7 +179,7 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
     elements have the same size on both sides of a film. Short interface edges are never merged, so
     the elements around them are small too.
     """
-    free = ~touches_wall(outline.wall)
+    free = touched(outline.wall) == FREE
     near = interface_sizes(outline, sizing)[free]
     edge = outline.edge_lengths()
     near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
@@ -223,7 +224,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     pieces = []
     for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(polygon.points)
-        if edge_wall[keep[0]] == WELD:  # both aggregates share the nodes of a weld
+        if edge_wall[keep[0]] >= WELD:  # both aggregates share the nodes of a weld
             halves = np.arange(outline.geometry) / outline.geometry
             pieces.append((np.repeat(keep[:-1], len(halves)), np.tile(halves, len(keep) - 1)))
         elif edge_wall[keep[0]] != FREE:
@@ -327,7 +328,7 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
         ends = outline.arcs(outline.origin)[edge]
         origin = seed + _on_arc(origin - seed, ends[:, 0] - seed, ends[:, 2] - seed)
     wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
-    on = touches_wall(wall)
+    on = touched(wall) != FREE
     points[on, 1] = outline.points[corner[on], 1]
     points[first] = outline.points[corner[first]]
     origin[first] = outline.origin[corner[first]]

@@ -3,7 +3,7 @@
 The channel is 0 <= y <= W, and a pore has a list of two walls. A stage reads the conditions from a
 wall and does not distinguish walls otherwise. Each aggregate has its own order of the walls: first
 the wall of its seed, then the opposite wall. Nodes and contact lines refer to a wall by its number;
-FREE means no wall.
+FREE means no wall. The number of a node also says to which weld of two aggregates it belongs.
 
 No substrate flows through a wall. This is the natural condition of the weak form (11)-(12), so the
 transport needs no data of the walls.
@@ -24,7 +24,8 @@ import numpy as np
 FREE = 0
 BOTTOM = 1
 TOP = 2
-#: Number for the surface of another aggregate, to which an aggregate is welded. It is not a wall.
+#: Number of the first weld: a surface that two aggregates share. Further welds have multiples of it.
+#: A node on a wall and a weld has the sum of both numbers.
 WELD = 3
 
 
@@ -104,9 +105,9 @@ def channel_walls(width: float, bonded: bool = False, upper: str = "no slip") ->
             Wall(TOP, width, -1.0, **{"bonded": bonded, **CONDITIONS[upper]}))
 
 
-def touches_wall(numbers: np.ndarray) -> np.ndarray:
-    """(M,) True where a node touches a wall, from :attr:`Outline.wall`: not free and not welded."""
-    return (numbers != FREE) & (numbers != WELD)
+def touched(numbers: np.ndarray) -> np.ndarray:
+    """(M,) number of the wall that each node touches, or FREE, from :attr:`Outline.wall`."""
+    return numbers % WELD
 
 
 def numbered(walls: Walls, number: int) -> Wall:

@@ -1,17 +1,19 @@
 """Welded aggregates: their boundaries share the nodes of the weld.
 
-Nodes of a weld have the number WELD in both outlines, and the same coordinates to the last bit.
-Each outline keeps its own coordinates at t = 0. An end of the weld is a line where the free
-surfaces of both aggregates meet and form a notch. The corners of the two surfaces are opposite: the
-k-th corner from the line on one surface is at about the same arc length as the k-th corner on the
-other surface. A new mesh gives both surfaces these corners (:func:`matched`), so that the weld can
-advance by nodes.
+Nodes of a weld have its number in both outlines, and the same coordinates to the last bit. The
+first weld has the number WELD. An aggregate may have several welds (:func:`pairs`). Each outline
+keeps its own coordinates at t = 0. An end of the weld is a line where the free surfaces of
+both aggregates meet and form a notch, or the wall of both aggregates if they share it. The corners
+of the two surfaces are opposite: the k-th corner from the line on one surface is at about the same
+arc length as the k-th corner on the other surface. A new mesh gives both surfaces these corners
+(:func:`matched`), so that the weld can advance by nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
 from repro.fem.outline import ON_ARC, Outline, area_beside_chord, parabola
 from repro.fem.sizing import Sizing, cut, placed
-from repro.fem.walls import FREE, WELD
+from repro.fem.walls import FREE, WELD, touched
 
 #: Corners of the two surfaces are opposite if their arc lengths from the line differ by at most
 #: this part of the shortest edge beside them. Below 1/2, no corner has two opposite corners.
@@ -39,6 +41,24 @@ AT_CORNER = 0.05
 ROUNDS = 12
 
 
+def welds_of(wall: np.ndarray) -> set[int]:
+    """Numbers of the welds of an aggregate; wall: (M,) as :attr:`Outline.wall`."""
+    return set((wall - touched(wall)).tolist()) - {FREE}
+
+
+def pairs(walls: Sequence[np.ndarray]) -> list[tuple[int, int]]:
+    """Indices of the two aggregates of each weld; walls: (M,) :attr:`Outline.wall` of each."""
+    of = [welds_of(wall) for wall in walls]
+    return [(first, second) for first, second in combinations(range(len(of)), 2)
+            if of[first] & of[second]]
+
+
+def common(first: Outline, second: Outline) -> int:
+    """Number of the weld of two outlines."""
+    weld, = welds_of(first.wall) & welds_of(second.wall)
+    return weld
+
+
 def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndarray]]:
     """(K, 2) um, the points of all outlines, with the points of a weld once; and for each outline,
     (M,) indices of its points."""
@@ -50,49 +70,63 @@ def shared_points(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[np.ndar
 
 def united(outlines: Sequence[Outline],
            own: Sequence[np.ndarray]) -> tuple[list[Outline], list[np.ndarray]]:
-    """Replace two welded outlines by the outline around both; others stay unchanged.
+    """Replace each two welded outlines by the outline around both; others stay unchanged.
 
     own: as :func:`shared_points` returns it. Returns the outlines, and ``own`` for them. Raises
     MeshError if two aggregates share more than one chain of nodes.
     """
-    if len(outlines) != 2 or not np.isin(own[0], own[1]).any():
-        return list(outlines), list(own)
-    first, second = outlines
-    weld = np.isin(own[0], own[1])
+    left = dict(enumerate(zip(outlines, own)))
+    part_of = list(left)
+    for first, second in pairs([outline.wall for outline in outlines]):
+        if np.isin(own[first], own[second]).any():  # not if they have just met
+            whole, part = sorted([part_of[first], part_of[second]])
+            left[whole] = _around(left[whole], left.pop(part))
+            part_of = [whole if each == part else each for each in part_of]
+    return [outline for outline, _ in left.values()], [nodes for _, nodes in left.values()]
+
+
+def _around(one: tuple[Outline, np.ndarray],
+            other: tuple[Outline, np.ndarray]) -> tuple[Outline, np.ndarray]:
+    """The outline around two welded ones, each with the indices (M,) of its points."""
+    first, first_own = one
+    second, second_own = other
+    weld = np.isin(first_own, second_own)
     starts = np.flatnonzero(weld & ~np.roll(weld, 1))
     if len(starts) != 1:
         raise MeshError("two aggregates touch at several places; a weld joins them at one place")
     size = int(weld.sum())
     around = (starts[0] + size - 1 + np.arange(len(weld) - size + 2)) % len(weld)
-    of_second = np.isin(own[1], own[0])
+    of_second = np.isin(second_own, first_own)
     begin = int(np.flatnonzero(of_second & ~np.roll(of_second, 1))[0]) + size
     beyond = (begin + np.arange(len(of_second) - size)) % len(of_second)
     wall = np.concatenate([first.wall[around], second.wall[beyond]])
     both = Outline(np.concatenate([first.points[around], second.points[beyond]]),
-                   np.where(wall == WELD, FREE, wall),
+                   touched(wall),
                    np.concatenate([first.fixed[around], second.fixed[beyond]]),
                    np.concatenate([first.origin[around], second.origin[beyond]]),
                    first.geometry, first.seat)
-    return [both], [np.concatenate([own[0][around], own[1][beyond]])]
+    return both, np.concatenate([first_own[around], second_own[beyond]])
 
 
-def ends_of(outline: Outline) -> tuple[int, int]:
-    """The first and the last node of an outline's weld, along its loop."""
-    weld = outline.wall == WELD
-    first = np.flatnonzero(weld & ~np.roll(weld, 1))[0]
-    last = np.flatnonzero(weld & ~np.roll(weld, -1))[0]
+def ends_of(outline: Outline, weld: int) -> tuple[int, int]:
+    """The first and the last node of one of an outline's welds, along its loop."""
+    on = outline.welded(weld)
+    first = np.flatnonzero(on & ~np.roll(on, 1))[0]
+    last = np.flatnonzero(on & ~np.roll(on, -1))[0]
     return int(first), int(last)
 
 
 def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarray]]:
-    """For both ends of a weld, the free nodes (k,) of either outline beyond the line.
+    """For each end of a weld off the walls, the free nodes (k,) of either outline beyond the line.
 
     The node of the line comes first.
     """
-    start, end = ends_of(first)
-    begin, last = ends_of(second)
-    return [(_free_from(first, end, 1), _free_from(second, begin, -1)),
+    weld = common(first, second)
+    start, end = ends_of(first, weld)
+    begin, last = ends_of(second, weld)
+    both = [(_free_from(first, end, 1), _free_from(second, begin, -1)),
             (_free_from(first, start, -1), _free_from(second, last, 1))]
+    return [walks for walks in both if all(len(walk) > 1 for walk in walks)]
 
 
 def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
@@ -133,35 +167,49 @@ def _shortest(lengths: np.ndarray) -> np.ndarray:
     return np.minimum(edges[:-1], edges[1:])
 
 
-def _are_welded(outlines: Sequence[Outline]) -> bool:
-    return len(outlines) == 2 and all((outline.wall == WELD).any() for outline in outlines)
+def _of_each_pair(change: Callable[[Sequence[Outline], Sizing], Sequence[Outline]],
+                  outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """The outlines after a ``change`` of each two that are welded."""
+    changed = list(outlines)
+    for pair in pairs([outline.wall for outline in outlines]):
+        others = tuple(each.corners for k, each in enumerate(changed) if k not in pair)
+        welded = change([changed[k] for k in pair], replace(sizing, others=others))
+        for k, outline in zip(pair, welded):
+            changed[k] = outline
+    return changed
 
 
 def matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
-    """The same curves with opposite corners beyond a weld, and short edges at its ends."""
-    if not _are_welded(outlines):
-        return list(outlines)
+    """The same curves with opposite corners beyond each weld, and short edges at its ends."""
+    return _of_each_pair(_matched, outlines, sizing)
+
+
+def _matched(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """:func:`matched` for two welded outlines."""
     return _with_opposite(_refined(outlines, sizing), sizing.film)
 
 
 def coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
-    """The outlines of welded aggregates with fewer corners along the weld and beyond its ends.
+    """The outlines of welded aggregates with fewer corners along each weld and beyond its ends.
 
     A corner leaves if the edge without it needs no split, or if it is too close to another one.
     Opposite corners leave together. Element sizes grow from the lines to the size of an interface.
     Corners of the shapes at t = 0 stay. The middle of a longer arc is a point of the curve.
     Outlines that have just met have a weld of one node, and stay unchanged.
     """
-    if not _are_welded(outlines) or np.count_nonzero(outlines[0].wall == WELD) == 1:
+    return _of_each_pair(_coarsened, outlines, sizing)
+
+
+def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
+    """:func:`coarsened` for two welded outlines."""
+    if np.count_nonzero(outlines[0].welded(common(*outlines))) == 1:
         return list(outlines)
-    outlines = matched(outlines, sizing)
-    for place in range(2):
-        walks = notches(*outlines)[place]
-        lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
-        reach = _reach(outlines, walks, lengths, MATCHED_FILMS * sizing.film)
-        count = min(opposite_corners(*lengths), int(np.count_nonzero(lengths[0] <= reach)))
-        outlines = _without_small_edges(outlines, [walk[: 2 * count - 1] for walk in walks],
-                                        np.maximum(lengths[0][:count] - sizing.film, 0.0), sizing)
+    outlines = _matched(outlines, sizing)
+    for place in range(len(notches(*outlines))):
+        walks = in_notch(outlines, notches(*outlines)[place], sizing.film)
+        lengths = lengths_from(outlines[0], walks[0])
+        outlines = _without_small_edges(outlines, walks, np.maximum(lengths - sizing.film, 0.0),
+                                        sizing)
     along = _along_weld(*outlines)
     s = lengths_from(outlines[0], along[0])
     first, second = _without_small_edges(outlines, along, np.minimum(s, s[-1] - s), sizing)
@@ -190,8 +238,9 @@ def _without_small_edges(outlines: Sequence[Outline], walks: Sequence[np.ndarray
 
 def _along_weld(first: Outline, second: Outline) -> tuple[np.ndarray, np.ndarray]:
     """(n,) nodes of the weld in either outline, in the order of the first one's loop."""
-    start, end = ends_of(first)
-    _, last = ends_of(second)
+    weld = common(first, second)
+    start, end = ends_of(first, weld)
+    _, last = ends_of(second, weld)
     steps = np.arange((end - start) % len(first.points) + 1)
     return (start + steps) % len(first.points), (last - steps) % len(second.points)
 
@@ -277,6 +326,16 @@ def _line_size(sizing: Sizing) -> float:
     return max(sizing.moving_lines, FINEST * sizing.film)
 
 
+def in_notch(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
+             film: float) -> list[np.ndarray]:
+    """The first nodes of ``walks`` on both outlines: those with opposite corners, as far as the
+    film between them is thinner than MATCHED_FILMS times the least one, ``film`` (um)."""
+    lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
+    reach = _reach(outlines, walks, lengths, MATCHED_FILMS * film)
+    count = min(opposite_corners(*lengths), int(np.count_nonzero(lengths[0] <= reach)))
+    return [walk[: 2 * count - 1] for walk in walks]
+
+
 def opposite_corners(one: np.ndarray, two: np.ndarray) -> int:
     """Number of consecutive pairs of opposite corners; the line is the first pair.
 
@@ -310,23 +369,37 @@ def _places(outline: Outline, walk: np.ndarray, s: np.ndarray) -> list[tuple[int
             for each, part in zip(k.astype(int), t.tolist())]
 
 
-def facing(first: Outline, second: Outline, reach: float) -> list[Outline]:
+def facing(first: Outline, second: Outline, reach: float, weld: int = WELD,
+           wall: int = FREE) -> list[Outline]:
     """The same curves with new corners: one at the point nearest to the other curve, marked as a
-    weld, and one at the arc length ``reach`` (um) on each side of it."""
+    weld with the number ``weld``, and one at the arc length ``reach`` (um) on each side of it.
+
+    wall: number of the wall that both aggregates touch, if any; the points are then the contact
+    lines there that face each other.
+    """
+    places = _nearest(first, second) if wall == FREE else (
+        [_line_beside(first, second, wall), _line_beside(second, first, wall)])
     outlines = []
-    for outline, (edge, t) in zip((first, second), _nearest(first, second)):
+    for outline, (edge, t) in zip((first, second), places):
         edges = len(outline.points) // outline.geometry
         node = outline.geometry * ((edge + round(t)) % edges)
         if AT_CORNER < t < 1 - AT_CORNER:
             outline = cut(outline, [(edge, t)])
             node = outline.geometry * (edge + 1)
-        wall = outline.wall.copy()
-        wall[node] = WELD
-        outline = replace(outline, wall=wall)
+        numbers = outline.wall.copy()
+        numbers[node] += weld
+        outline = replace(outline, wall=numbers)
         sides = [_free_from(outline, node, direction) for direction in (1, -1)]
-        outlines.append(cut(outline, [place for walk in sides
+        outlines.append(cut(outline, [place for walk in sides if len(walk) > 1
                                       for place in _places(outline, walk, np.array([reach]))]))
     return outlines
+
+
+def _line_beside(outline: Outline, other: Outline, wall: int) -> tuple[int, float]:
+    """(edge, t) of the contact line with a wall that is nearest to another outline."""
+    on = np.flatnonzero(outline.touches(wall))
+    apart = np.abs(outline.points[on, 0] - 0.5 * (other.upstream + other.downstream))
+    return int(on[np.argmin(apart)]) // outline.geometry, 0.0
 
 
 def _nearest(first: Outline, second: Outline) -> list[tuple[int, float]]:

@@ -6,8 +6,8 @@ Each end is an event with a margin: zero at the event and positive after it.
     tearing       largest tensile stress / growth.tensile_strength - 1
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
-    meeting       1 - film between two aggregates / growth.minimum_film, or, if they are welded,
-                  between one of them and the wall of the other one
+    meeting       1 - film between two aggregates / growth.minimum_film, or, if they are welded to
+                  each other, between one of them and the wall of the other one
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the
@@ -22,8 +22,8 @@ walls cannot hold the aggregate, or if erosion removes a contact surface: the mo
 surface that becomes free.
 
 With growth.meeting = "weld", two aggregates on opposite walls join when they meet
-(:mod:`repro.model.welding`), and the run continues. :attr:`repro.Scene.without_weld` gives the
-reason if they cannot join.
+(:mod:`repro.model.welding`), and the run continues. Otherwise the message gives the reason:
+:attr:`repro.Scene.without_weld`, or the walls that the two touch, or the weld that one of them has.
 
 With growth.until = "steady", a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
@@ -92,8 +92,8 @@ class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
 
     With ``growth.meeting = "weld"``, the default, two aggregates on opposite walls join instead,
-    and the run continues until one of them reaches the wall of the other one. This would enclose
-    water.
+    and the run continues until one of them reaches the wall of the other one, or a third aggregate.
+    The former would enclose water.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the coordinates (um).
@@ -155,13 +155,14 @@ class Event:
     """An end of a run in one state: its margin, and the exception that reports it.
 
     leaves: index of the aggregate that leaves the pore if growth.after_detachment = "continue";
-    None if the run ends. joins: do two aggregates join, so that the run continues?
+    None if the run ends. joins: indices of two aggregates that join, so that the run continues;
+    None if the run ends.
     """
 
     margin: float
     end: RunEnd
     leaves: int | None = None
-    joins: bool = False
+    joins: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,9 +189,9 @@ class Reached:
         return replace(self, event=replace(self.event, end=type(end)(text)))
 
     @property
-    def joins(self) -> bool:
-        """Do two aggregates join at the end of the step?"""
-        return self.event.joins and self.event.margin > 0
+    def joins(self) -> tuple[int, int] | None:
+        """Indices of two aggregates that join at the end of the step; None if none join."""
+        return self.event.joins if self.event.margin > 0 else None
 
     def leaves(self, continues: bool) -> int | None:
         """Index of the aggregate that leaves the pore at the end of the step; None if none leaves.
@@ -311,34 +312,71 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
     """The events of all pairs of aggregates."""
     least = ends.loading.growth.minimum_film
     for pair, film, (x, y) in _films(pore):
-        end = Meeting(f"{pair} meet at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the "
-                      f"film between them is {film:.3g} um, and it closes below "
-                      f"growth.minimum_film, {least:g} um; {ends.without_weld}")
-        yield Event(1 - film / least, end, joins=not ends.without_weld)
-    if pore.welded:
-        yield from _enclosures(least, pore)
+        reason = ends.without_weld or _apart(pore, pair, film)
+        end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g}, "
+                      f"y = {y:.4g} um the film between them is {film:.3g} um, and it closes below "
+                      f"growth.minimum_film, {least:g} um; {reason}")
+        yield Event(1 - film / least, end, joins=None if reason else pair)
+    for group in pore.groups:
+        if len(group) > 1:
+            yield from _further_contacts(least, pore, group)
 
 
-def _enclosures(least: float, pore: Pore) -> Iterator[Event]:
-    """The events of welded aggregates that reach the wall of the other one, which would enclose
-    water; least: um, growth.minimum_film."""
-    for body, outline in zip(pore.bodies, pore.outlines):
+def _apart(pore: Pore, pair: tuple[int, int], film: float) -> str:
+    """Why two aggregates that meet do not join; empty if they join; film: um, the least one between
+    them.
+
+    A weld must not enclose water. So the two, with those to which they are welded, have no wall in
+    common, or they meet at their only common wall.
+    """
+    if any({*pair} <= {*group} for group in pore.groups):
+        return "this would enclose water beside a weld"
+    walls = pore.common_walls(pair)
+    if len(walls) > 1 or walls and _between_lines(pore, pair, *walls) > (1 + CLOSE) * film:
+        return "this would enclose water between them and a wall"
+    return ""
+
+
+def _between_lines(pore: Pore, pair: tuple[int, int], wall: int) -> float:
+    """Distance (um) between the contact surfaces of two aggregates with a wall; infinite if they do
+    not both touch it."""
+    along = [outline.points[outline.touches(wall), 0]
+             for outline in (pore.outlines[number] for number in pair)]
+    if not all(map(len, along)):
+        return inf
+    first, second = along
+    return float(max(first.min() - second.max(), second.min() - first.max()))
+
+
+def _further_contacts(least: float, pore: Pore, group: tuple[int, ...]) -> Iterator[Event]:
+    """The events of welded aggregates that reach a further wall, where the model has no contact for
+    them; group: their indices; least: um, growth.minimum_film."""
+    for number in group:
+        outline = pore.outlines[number]
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
-            names = " and ".join(each.name for each in pore.bodies)
-            end = Meeting(f"aggregates {names} meet at t = {pore.time:g} h: near x = {x:.4g} um "
-                          f"the film between aggregate {body.name} and the wall of the other one "
-                          f"is {film:.3g} um, and it closes below growth.minimum_film, {least:g} "
-                          "um; this would enclose water beside their weld")
+            touched = any(pore.outlines[other].touches(wall.number).any() for other in group)
+            reason = ("this would enclose water beside a weld" if touched else
+                      "the model has no further contact of welded aggregates")
+            end = Meeting(f"{_names(pore, group)} meet at t = {pore.time:g} h: near x = {x:.4g} um "
+                          f"the film between aggregate {pore.bodies[number].name} and the wall "
+                          f"y = {wall.y:g} um is {film:.3g} um, and it closes below "
+                          f"growth.minimum_film, {least:g} um; {reason}")
             yield Event(1 - film / least, end)
 
 
-def _films(pore: Pore) -> Iterator[tuple[str, float, np.ndarray]]:
-    """For each pair of aggregates: their names, the least film (um) and its coordinates (2,) um."""
-    if pore.welded:
-        return
-    for (one, outline), (other, beside) in combinations(zip(pore.bodies, pore.outlines), 2):
-        yield f"aggregates {one.name} and {other.name}", *outline.film(beside)
+def _films(pore: Pore) -> Iterator[tuple[tuple[int, int], float, np.ndarray]]:
+    """For each two aggregates that are not welded to each other: their indices, the least film (um)
+    and its coordinates (2,) um."""
+    for pair in combinations(range(len(pore.bodies)), 2):
+        if pair not in pore.welds:
+            one, other = (pore.outlines[number] for number in pair)
+            yield pair, *one.film(other)
+
+
+def _names(pore: Pore, numbers: tuple[int, ...]) -> str:
+    """Names of aggregates in messages."""
+    return "aggregates " + " and ".join(pore.bodies[number].name for number in numbers)
 
 
 def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: str, subject: str,
@@ -378,7 +416,7 @@ def refuse_outside(channel: Channel, previous: Pore, expanded: Pore) -> None:
     """
     for pair, film, _ in _films(expanded):
         if film == 0:
-            raise Meeting(f"{pair} meet in the step from t = {previous.time:g} h")
+            raise Meeting(f"{_names(expanded, pair)} meet in the step from t = {previous.time:g} h")
     for side in ("upstream", "downstream"):
         if elements_to_end(channel, expanded, side) < LEAST_ELEMENTS:
             nearest = expanded.name_of(farthest(expanded, side))

@@ -208,13 +208,14 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
         end = replace(end, step=replace(end.step, within=step.within))
     elif stages.tables.jumps(step.pore.time):
         end = reached(*_after_jump(stages, step, after))
-    if end.joins:
-        end = reached(*_after_meeting(stages, end))
-    leaves = end.leaves(stages.growth.continues)
-    while leaves is not None:
-        end = reached(*_after_detachment(stages, end, leaves))
+    while True:
         leaves = end.leaves(stages.growth.continues)
-    return end, control
+        if end.joins is not None:
+            end = reached(*_after_meeting(stages, end, end.joins))
+        elif leaves is not None:
+            end = reached(*_after_detachment(stages, end, leaves))
+        else:
+            return end, control
 
 
 def _after_detachment(stages: Stages, reached: Reached,
@@ -231,10 +232,12 @@ def _after_detachment(stages: Stages, reached: Reached,
                    departed=departed), solved
 
 
-def _after_meeting(stages: Stages, reached: Reached) -> tuple[StepResult, Solved]:
-    """Return the state just after two aggregates have joined."""
+def _after_meeting(stages: Stages, reached: Reached,
+                   pair: tuple[int, int]) -> tuple[StepResult, Solved]:
+    """Return the state just after two aggregates have joined; pair: their indices."""
     step = reached.step
-    after, solved = stages.grading.solve(stages.weld(step.pore, reached.solved))
+    welded = stages.weld(step.pore, pair, reached.solved)
+    after, solved = settle(stages, *stages.grading.solve(welded))
     ledger = replace(step.ledger, biomass_after=after.mass)
     return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 

@@ -164,7 +164,7 @@ def fluid_loads(loading: Loading, pore: Pore, solved: Solved) -> tuple[Load, ...
 def _load(mesh: Mesh, outline: Outline, region: Region, forces: np.ndarray) -> Load:
     """Resultant of forces (n, 2) MPa um on the nodes of one aggregate."""
     seeded, *_ = outline.seat.walls(mesh.walls)
-    on = outline.points[outline.wall == seeded.number, 0]
+    on = outline.points[outline.touches(seeded.number), 0]
     x, y = (mesh.points[region.nodes] - [(on.min() + on.max()) / 2, seeded.y]).T
     moment = float(x @ forces[:, 1] - y @ forces[:, 0])
     return Load(float(forces[:, 0].sum()), float(forces[:, 1].sum()), moment)
@@ -178,7 +178,7 @@ def wall_forces(loading: Loading, pore: Pore, solved: Solved) -> np.ndarray:
     mesh = pore.mesh
     nodal = np.zeros_like(mesh.points)
     for body, region in zip(pore.bodies, mesh.regions):
-        nodal[region.nodes] = growth.internal_forces(
+        nodal[region.nodes] += growth.internal_forces(
             body.solid, body.theta, mesh.points[region.nodes], pore.pressure[region.corner_nodes])
     forces = loading.growth.shear_modulus * nodal[mesh.body]
     if loading.growth.has_fluid_forces:
@@ -208,13 +208,15 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
         water = flow.solve(rest.space, driven, loading.length, interface=loading.interface)
         solved = replace(solved, flow=water)
         forces = fluid_forces(loading, rest, solved) / loading.growth.shear_modulus
-    if rest.welded:
-        from repro.model.welding import Welding  # a run without a weld does not load it
-        return Welding(mechanics, rest, rest, forces).equilibrium(), solved
-    for number, region in enumerate(rest.mesh.regions):
-        seen = rest.focused(number)
-        own = None if forces is None else rest.mesh.of_region(region, forces)
-        rest = _under_forces(mechanics, seen, own)
+        forces = rest.mesh.from_body(forces)
+    for group in rest.groups:
+        if len(group) > 1:
+            from repro.model.welding import Welding  # a run without a weld does not load it
+            rest = Welding(mechanics, rest, rest, group, forces).equilibrium()
+        else:
+            seen = rest.focused(*group)
+            own = None if forces is None else forces[seen.region.nodes]
+            rest = _under_forces(mechanics, seen, own)
     return rest.focused(pore.focus), solved
 
 

@@ -23,15 +23,15 @@ from repro.model.solid import Solid
 class Body:
     """One aggregate at one time.
 
-    wall: (M,) wall that each node of its loop touches, FREE or WELD; fixed: (M,) True where x is
-    constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at its points of the reaction; theta:
-    (t, q) expansion since t = 0 in its triangles; solid: the aggregate at t = 0; configuration:
-    the one from which strain counts; line_speeds: (2, 2, 2) um/h, speeds of the contact lines in
-    the first and the second half of the last step, None if unknown. Each row is one wall, the lower
-    wall first. Its first line is where a free surface begins along the loop, its second line where
-    a free surface ends. seat: position of its seed; name: in messages. origin_known: False after
-    present positions have replaced positions at t = 0 that fold. This happens only if strain does
-    not count from t = 0.
+    wall: (M,) number of the wall that each node of its loop touches or of its weld, or FREE; fixed:
+    (M,) True where x is constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at its points of the
+    reaction; theta: (t, q) expansion since t = 0 in its triangles; solid: the aggregate at t = 0;
+    configuration: the one from which strain counts; line_speeds: (2, 2, 2) um/h, speeds of the
+    contact lines in the first and the second half of the last step, None if unknown. Each row is
+    one wall, the lower wall first. Its first line is where a free surface begins along the loop,
+    its second line where a free surface ends. seat: position of its seed; name: in messages.
+    origin_known: False after present positions have replaced positions at t = 0 that fold. This
+    happens only if strain does not count from t = 0.
     """
 
     wall: np.ndarray

@@ -225,25 +225,33 @@ def shape_under(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], 
                 forces: np.ndarray | None, search: SearchOptions) -> Expansion:
     """The new shapes under constant nodal forces (n, 2) um, over mu_L; None for no forces.
 
-    The shapes are computed one after the other, unless aggregates are welded.
+    The shapes are computed one after the other, those of welded aggregates together.
     """
     mesh = grown.mesh
     bodies = [replace(body, theta=expansion,
                       configuration=body.configuration.restarted(mesh.points[region.nodes]))
               for body, expansion, region in zip(grown.bodies, theta, mesh.regions, strict=True)]
     shape = Expansion(replace(grown, bodies=tuple(bodies)), 0)
-    if grown.welded:
-        from repro.model.welding import Welding  # a run without a weld does not load it
-        return Welding(mechanics, shape.pore, start, forces, patient=search.patient).close()
-    for number, region in enumerate(mesh.regions):
-        own = None if forces is None else mesh.of_region(region, forces)
-        closing = CLOSINGS[mesh.geometry](mechanics, shape.pore.focused(number),
-                                          start.focused(number), own, search)
-        closed = closing.close()
+    nodal = None if forces is None else mesh.from_body(forces)
+    for group in grown.groups:
+        closed = _closed(mechanics, shape.pore, start, group, nodal, search)
         for division in closed.divisions:
             start = divided_start(start, closed.pore, division)
+            nodal = None if nodal is None else division.divided_loads(nodal)
         shape = shape.joined(closed)
     return replace(shape, pore=shape.pore.focused(None))
+
+
+def _closed(mechanics: Mechanics, grown: Pore, start: Pore, group: tuple[int, ...],
+            forces: np.ndarray | None, search: SearchOptions) -> Expansion:
+    """The new shape of aggregates that move together; group: their indices; forces: (N, 2) um."""
+    number, *other = group
+    if other:
+        from repro.model.welding import Welding  # a run without a weld does not load it
+        return Welding(mechanics, grown, start, group, forces, patient=search.patient).close()
+    own = None if forces is None else forces[grown.mesh.regions[number].nodes]
+    return CLOSINGS[grown.mesh.geometry](mechanics, grown.focused(number), start.focused(number),
+                                         own, search).close()
 
 
 def divided_start(start: Pore, shape: Pore, division: Division | Bisection) -> Pore:

@@ -28,7 +28,7 @@ import numpy as np
 
 from repro.errors import GrowthError
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, Walls, numbered
+from repro.fem.walls import FREE, Walls, numbered, touched
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle).
 #: With 2e-3 this error was 0.01 um, up to 0.2 % of a short contact length
@@ -203,7 +203,7 @@ def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray,
 def surface_ends(outline: Outline, wall: int) -> list[tuple[int, int]]:
     """(node, direction) of each end of the contact surfaces with a wall. The next node in this
     direction is not on the wall."""
-    on = outline.wall == wall
+    on = outline.touches(wall)
     if not on.any():
         return []
     last = on & ~np.append(on[1:], on[0])
@@ -378,7 +378,7 @@ def advances_at(by_line: np.ndarray, number: int,
 
 def lines_of(outline: Outline) -> list[Line]:
     """All contact lines of an outline, in the order of the numbers of their walls."""
-    walls = np.unique(outline.wall[outline.wall != FREE]).tolist()
+    walls = np.unique(touched(outline.wall[outline.wall != FREE])).tolist()
     return [Line(wall, node, direction) for wall in walls
             for node, direction in surface_ends(outline, wall)]
 

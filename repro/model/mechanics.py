@@ -16,7 +16,7 @@ import numpy as np
 from repro.fem.division import Division
 from repro.fem.outline import Outline
 from repro.fem.refinement import Bisection
-from repro.fem.walls import touches_wall
+from repro.fem.walls import FREE, touched
 from repro.model import growth
 from repro.model.contact_lines import Advances, SearchOptions
 from repro.model.pore import Pore
@@ -157,14 +157,14 @@ def constraints(grown: Pore, shape: Pore) -> tuple[np.ndarray, np.ndarray]:
     """
     rim = shape.region.own_loop
     before = grown.mesh.points[grown.region.nodes]
-    touched = shape.body.wall
+    walls = shape.body.wall
     fixed = shape.body.fixed
     target = shape.mesh.points[shape.region.nodes].copy()
     for wall in shape.walls:
-        target[rim[touched == wall.number], 1] = wall.y
+        target[rim[touched(walls) == wall.number], 1] = wall.y
         fixed = fixed | (wall.bonded & wall.holds(before[rim]))
     target[rim[fixed], 0] = before[rim[fixed], 0]
-    return constrained(len(target), rim, touched, fixed), target
+    return constrained(len(target), rim, walls, fixed), target
 
 
 def supports_of(solid: Solid, shape: Pore, forces: np.ndarray | None) -> list[Support]:
@@ -189,7 +189,7 @@ def surface_supports(solid: Solid, shape: Pore) -> list[Support]:
     bearing = []
     for wall in walls:
         edges = rim[outline.edges_on(wall.number)]
-        points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]
+        points = rim[outline.fixed & outline.touches(wall.number) & (not wall.bonded)]
         if len(edges) and len(points):
             bearing.append(Support.on(int(points[0]), edges, solid.reference))
     return bearing
@@ -202,7 +202,7 @@ def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray
     """
     prescribed = np.zeros((count, 2), bool)
     prescribed[rim[fixed], 0] = True
-    prescribed[rim[touches_wall(wall)], 1] = True
+    prescribed[rim[touched(wall) != FREE], 1] = True
     return prescribed
 
 
@@ -211,7 +211,7 @@ def with_new_surfaces(pore: Pore) -> Pore:
     outline = pore.boundary
     fixed = outline.fixed
     for wall in pore.walls:
-        if wall.keeps_point and not outline.fixed[outline.wall == wall.number].any():
+        if wall.keeps_point and not outline.fixed[outline.touches(wall.number)].any():
             fixed = fixed | middle_of(outline, wall.number)
     return pore.with_body(fixed=fixed)
 
@@ -221,7 +221,7 @@ def middle_of(outline: Outline, wall: int) -> np.ndarray:
 
     If this node is the middle of an arc, the corner before it is chosen.
     """
-    on = outline.wall == wall
+    on = outline.touches(wall)
     x = outline.points[:, 0]
     chosen = np.zeros(len(on), bool)
     if on.any():

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from repro.fem import welds
 from repro.fem.brief import brief
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
-from repro.fem.walls import WELD, Walls
+from repro.fem.walls import Walls
 from repro.model.body import Body
 from repro.scene import needed
 
@@ -73,9 +74,26 @@ class Pore:
         return sum(body.spans for body in self.bodies)
 
     @property
-    def welded(self) -> bool:
-        """Are the two aggregates welded to each other?"""
-        return any((body.wall == WELD).any() for body in self.bodies)
+    def welds(self) -> list[tuple[int, int]]:
+        """Indices of the two aggregates of each weld."""
+        return welds.pairs([body.wall for body in self.bodies])
+
+    @property
+    def groups(self) -> list[tuple[int, ...]]:
+        """Indices of the aggregates that move together: one alone, or all that are welded."""
+        group_of = list(range(len(self.bodies)))
+        for pair in self.welds:
+            first, second = sorted(group_of[number] for number in pair)
+            group_of = [first if group == second else group for group in group_of]
+        return [tuple(number for number, own in enumerate(group_of) if own == group)
+                for group in sorted(set(group_of))]
+
+    def common_walls(self, pair: tuple[int, int]) -> tuple[int, ...]:
+        """Numbers of the walls that the groups of two aggregates both touch."""
+        first, second = (next(group for group in self.groups if number in group) for number in pair)
+        return tuple(wall.number for wall in self.mesh.walls if all(
+            any(self.outlines[number].touches(wall.number).any() for number in group)
+            for group in (first, second)))
 
     @property
     def accumulates(self) -> bool:

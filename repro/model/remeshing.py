@@ -17,7 +17,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.transfer import Located
-from repro.fem.walls import touches_wall
+from repro.fem.walls import FREE, touched
 from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
 from repro.model.body import Body
@@ -119,7 +119,7 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     position = generated.at.field(old.points, old.cells[old.biomass])
     points = start.mesh.from_body(position, start.mesh.points)
     for body, region in zip(start.bodies, start.mesh.regions):
-        on_wall = region.loop[touches_wall(body.wall)]
+        on_wall = region.loop[touched(body.wall) != FREE]
         points[on_wall, 1] = start.mesh.points[on_wall, 1]
     mesh = moved_mesh(rules.meshing, start, start.moved(points), start.mesh.poor)
     if mesh is None:
@@ -264,7 +264,7 @@ def _transferred(rules: Remeshing, expanded: Pore, target: Pore, at: Located,
         def carry(positions: np.ndarray, before: Region = expanded.mesh.regions[number],
                   after: Region = target.mesh.regions[number]) -> np.ndarray:
             nodal = old.from_region(before, positions)
-            if target.welded:  # the nodes of the weld have other positions in the other aggregate
+            if target.welds:  # the nodes of the weld have other positions in the other aggregate
                 own = transfer.located(old.points, before.cells, target.mesh.points[after.nodes])
                 return own.field(nodal, before.cells)
             carried = target.mesh.from_body(at.field(nodal, old.cells[old.biomass]))

@@ -85,10 +85,10 @@ class Stages:
         """The pore without the aggregate with index ``number``, by :func:`remeshing.without`."""
         return remeshing.without(self.remeshing, pore, number, solved.mean_velocity)
 
-    def weld(self, pore: Pore, solved: Solved) -> Pore:
-        """The pore after its two aggregates have joined, by :func:`welding.join`."""
+    def weld(self, pore: Pore, pair: tuple[int, int], solved: Solved) -> Pore:
+        """The pore after two aggregates have joined, by :func:`welding.join`."""
         from repro.model import welding  # a run without a weld does not load it
-        return welding.join(self.mechanics, self.remeshing, pore, solved.mean_velocity)
+        return welding.join(self.mechanics, self.remeshing, pore, pair, solved.mean_velocity)
 
     def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved,
                  generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:

@@ -43,12 +43,18 @@ class Support:
         point: its fixed node; edges: (e, 2 or 3) nodes of its edges; reference: (n, 2) um,
         positions in the configuration from which strain counts.
         """
-        nodes = edges.shape[1]
-        _, slopes = edge_functions(nodes, np.linspace(0, 1, nodes))
-        weights = ELEMENTS[nodes - 1].edge_weights
-        lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * weights
-        load = np.bincount(edges.ravel(), lengths.ravel(), len(reference))
-        return Support(point, load / load.sum())
+        lengths = lengths_along(edges, reference)
+        return Support(point, lengths / lengths.sum())
+
+
+def lengths_along(edges: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """(n,) um, the integrals of the shape functions along edges; arguments of :meth:`Support.on`.
+    """
+    nodes = edges.shape[1]
+    _, slopes = edge_functions(nodes, np.linspace(0, 1, nodes))
+    weights = ELEMENTS[nodes - 1].edge_weights
+    lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * weights
+    return np.bincount(edges.ravel(), lengths.ravel(), len(reference))
 
 
 def balanced(supports: Sequence[Support], residual: np.ndarray) -> np.ndarray:

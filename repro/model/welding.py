@@ -13,7 +13,7 @@ advance by nodes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,10 +25,11 @@ from repro.errors import GrowthError, LinearError
 from repro.fem import welds
 from repro.fem.division import Division
 from repro.fem.forms import Basis, basis
-from repro.fem.mesh import Mesh
-from repro.fem.walls import FREE, WELD
+from repro.fem.mesh import Mesh, Region
+from repro.fem.outline import Outline
+from repro.fem.walls import FREE, WELD, touched
 from repro.model import growth, remeshing
-from repro.model.closing_by_lines import divided
+from repro.model.closing_by_lines import FIRST_LENGTHS, divided
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF, Contact
 from repro.model.mechanics import (
@@ -36,13 +37,11 @@ from repro.model.mechanics import (
     Expansion,
     Mechanics,
     constraints,
-    surface_supports,
-    with_new_surfaces,
 )
 from repro.model.pore import Pore
 from repro.model.remeshing import Remeshing
 from repro.model.solid import Shape, Solid
-from repro.model.support import Support
+from repro.model.support import Support, lengths_along
 
 #: The last arc of a weld is halved until a part is shorter than this times numerics.tolerance of
 #: the arc: a sixteenth in ``fast``. Lengths then err by 0.8 % or less, and by up to 1.4 % with an
@@ -62,37 +61,85 @@ class WeldedSolid(Solid):
         return basis(self.shape.cells, len(self.reference), self.in_triangles, self.shape.table)
 
 
-def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float) -> Pore:
-    """The pore after two aggregates have met and joined.
+def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, int],
+         speed: float) -> Pore:
+    """The pore after two aggregates have met and joined; pair: their indices.
 
-    The weld extends by the thickness of the least film on each side of the nearest points. speed:
-    as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
+    The weld extends by the thickness of the least film on each side of the nearest points, or from
+    the wall that both aggregates touch; if there is then no equilibrium, by half of this length, or
+    a quarter. speed: as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
     """
-    film = mechanics.keys.minimum_film
-    first, second = pore.outlines
-    outlines = welds.facing(first, second, film)
+    for length in mechanics.keys.minimum_film * FIRST_LENGTHS:
+        try:
+            return _joined_along(mechanics, rules, pore, pair, speed, length)
+        except (GrowthError, LinearError) as error:
+            failure = error
+    raise failure
+
+
+def _joined_along(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, int],
+                  speed: float, length: float) -> Pore:
+    """:func:`join` with a weld that extends by a length (um)."""
+    outlines = list(pore.outlines)
+    weld = WELD + max([0, *(number for each in outlines for number in welds.welds_of(each.wall))])
+    first, second = pair
+    wall, = pore.common_walls(pair) or (FREE,)
+    outlines[first], outlines[second] = welds.facing(
+        outlines[first], outlines[second], length, weld, wall)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
-    shape = Welding(mechanics, facing, facing, reach=film).close()
+    group = next(group for group in facing.groups if first in group)
+    facing = with_one_point(facing, group)
+    shape = Welding(mechanics, facing, facing, group, reach=length).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
+
+
+def with_one_point(pore: Pore, group: Sequence[int]) -> Pore:
+    """The pore with one fixed point on each wall that welded aggregates touch (2.3.3).
+
+    Their contact surfaces with one wall are one surface. If it has not exactly one fixed point, the
+    corner nearest to its middle becomes the point.
+    """
+    fixed = {number: pore.bodies[number].fixed for number in group}
+    for wall in pore.mesh.walls:
+        on = {number: pore.outlines[number].touches(wall.number) for number in group}
+        points = sum(np.count_nonzero(fixed[number] & on[number]) for number in group)
+        if points == 1 or not (wall.keeps_point and any(each.any() for each in on.values())):
+            continue
+        x = {number: np.where(on[number], pore.outlines[number].points[:, 0], np.nan)
+             for number in group}
+        along = np.concatenate([each[::pore.mesh.geometry] for each in x.values()])
+        middle = 0.5 * (np.nanmin(along) + np.nanmax(along))
+        nearest = along[np.nanargmin(np.abs(along - middle))]
+        chosen = next(number for number in group if (x[number] == nearest).any())
+        for number in group:
+            fixed[number] = np.where(on[number], (number == chosen) & (x[number] == nearest),
+                                     fixed[number])
+    bodies = [replace(body, fixed=fixed.get(number, body.fixed))
+              for number, body in enumerate(pore.bodies)]
+    return replace(pore, bodies=tuple(bodies))
 
 
 @dataclass(eq=False)
 class Notch:
     """The water at one end of a weld.
 
-    pairs: (k, 2) opposite nodes of the mesh, from the line on; before: (k, 2, 2) um, their
-    positions in the old shape; size: number of nodes from corner to corner; film: least film (um);
-    slope: tangent of the least angle; joined: number of pairs of corners beyond the old line that
-    have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
+    weld: its number; sides: its two aggregates, as indices into their group; pairs: (k, 2) opposite
+    nodes of the mesh, from the line on; before: (k, 2, 2) um, their positions in the old shape;
+    size: number of nodes from corner to corner; film: least film (um); slope: tangent of the least
+    angle; new: have the two aggregates just met? joined: number of pairs of corners beyond the old
+    line that have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
     thin; first_enough: smallest number for which no film is too thin; step: the next trial has
     at most this many pairs fewer.
     """
 
+    weld: int
+    sides: tuple[int, int]
     pairs: np.ndarray
     before: np.ndarray
     size: int
     film: float
     slope: float
+    new: bool
     joined: int = 0
     first_enough: float = inf
     step: int = 1
@@ -148,7 +195,7 @@ class Notch:
         normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         across = np.einsum("ki,ki->k", normal, before[1] - before[0])
-        normal *= np.sign(across[np.argmax(np.abs(across))])
+        normal *= np.sign(across[1])
         gap = np.einsum("ki,ki->k", normal, two - one)[1:]
         needs = np.minimum(self.film, self.slope * along)
         needs[along < ANGLE_FROM * (1 - ROUND_OFF) * self.film / self.slope] *= PART_OF_ANGLE
@@ -167,11 +214,11 @@ def _along_arcs(nodes: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Union:
-    """The nodes of all aggregates, with the two nodes of a tied pair as one.
+    """The nodes of welded aggregates, with the two nodes of a tied pair as one.
 
     nodes: (n,) nodes of the mesh, ascending; number: (N,) index in ``nodes`` of each node of the
-    mesh, or of the node to which it is tied; cells: (t, k) triangles as indices into ``nodes``;
-    corners: number of corners among ``nodes``.
+    aggregates, or of the node to which it is tied; cells: (t, k) triangles as indices into
+    ``nodes``; corners: number of corners among ``nodes``.
     """
 
     nodes: np.ndarray
@@ -180,12 +227,12 @@ class Union:
     corners: int
 
     @staticmethod
-    def of(mesh: Mesh, tied: np.ndarray) -> Union:
-        """The union of a mesh's aggregates; tied: (k, 2) pairs of nodes."""
+    def of(mesh: Mesh, regions: Sequence[Region], tied: np.ndarray) -> Union:
+        """The union of the aggregates in regions of a mesh; tied: (k, 2) pairs of nodes."""
         alias = np.arange(len(mesh.points))
         alias[tied[:, 1]] = tied[:, 0]
-        cells = alias[mesh.cells[mesh.biomass]]
-        nodes, own_cells = np.unique(cells, return_inverse=True)
+        cells = mesh.by_triangle([region.cells for region in regions], regions)
+        nodes, own_cells = np.unique(alias[cells], return_inverse=True)
         return Union(nodes, np.searchsorted(nodes, alias), own_cells.reshape(cells.shape),
                      int(np.count_nonzero(nodes < mesh.corners)))
 
@@ -198,37 +245,62 @@ class Union:
 
 @dataclass(eq=False)
 class Welding:
-    """Closing of the film between two aggregates that are welded, or that have just met.
+    """Closing of the films between aggregates that are welded, or that have just met.
 
     grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
-    shape and pressure from which the search starts; forces: (n, 2) um on the nodes of all
-    aggregates, over mu_L, None for no forces; reach: um, half of the first length of the weld if
-    the aggregates have just met, zero otherwise; patient: as in :class:`SearchOptions`.
+    shape and pressure from which the search starts; group: indices of the aggregates; forces:
+    (N, 2) um at the nodes of the mesh, over mu_L, None for no forces; reach: um, by which a new
+    weld extends on each side of its node; patient: as in :class:`SearchOptions`.
     """
 
     mechanics: Mechanics
     grown: Pore
     start: Pore
+    group: tuple[int, ...]
     forces: np.ndarray | None = None
     reach: float = 0.0
     patient: bool = True
 
     def __post_init__(self) -> None:
         self._iterations = 0
-        self._notches = [self._notch(walks) for walks in welds.notches(*self.grown.outlines)]
+        self._notches = [self._notch(sides, walks) for sides, walks in self._walks()]
 
-    def _notch(self, walks: Sequence[np.ndarray]) -> Notch:
-        """The notch with the nodes ``walks`` on both outlines (:func:`welds.notches`)."""
+    @property
+    def _outlines(self) -> list[Outline]:
+        """The boundaries of the aggregates."""
+        return [self.grown.outlines[number] for number in self.group]
+
+    @property
+    def _loops(self) -> list[np.ndarray]:
+        """(M,) nodes of the boundary of each aggregate."""
+        return [self.grown.mesh.topology.loops[number] for number in self.group]
+
+    @property
+    def _regions(self) -> list[Region]:
+        """The regions of the aggregates."""
+        return [self.grown.mesh.regions[number] for number in self.group]
+
+    def _walks(self) -> Iterator[tuple[tuple[int, int], Sequence[np.ndarray]]]:
+        """The two aggregates of each notch, and the nodes on both outlines (:func:`welds.notches`).
+        """
+        outlines = self._outlines
+        for first, second in welds.pairs([outline.wall for outline in outlines]):
+            for walks in welds.notches(outlines[first], outlines[second]):
+                yield (first, second), walks
+
+    def _notch(self, sides: tuple[int, int], walks: Sequence[np.ndarray]) -> Notch:
+        """The notch between two aggregates; walks: as :meth:`_walks` yields them."""
         mesh = self.grown.mesh
         keys = self.mechanics.keys
-        size = mesh.geometry
-        lengths = [welds.lengths_from(*each) for each in zip(self.grown.outlines, walks)]
-        nodes = size * (welds.opposite_corners(*lengths) - 1) + 1
-        pairs = np.column_stack([loop[walk[:nodes]]
-                                 for loop, walk in zip(mesh.topology.loops, walks)])
-        return Notch(pairs, mesh.points[pairs], size, keys.minimum_film,
-                     np.tan(keys.minimum_contact_angle),
-                     int(np.abs(lengths[0] - self.reach).argmin()))
+        outlines = [self._outlines[side] for side in sides]
+        weld = welds.common(*outlines)
+        new = np.count_nonzero(outlines[0].welded(weld)) == 1
+        walks = welds.in_notch(outlines, walks, keys.minimum_film)
+        lengths = welds.lengths_from(outlines[0], walks[0])
+        joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
+        pairs = np.column_stack([self._loops[side][walk] for side, walk in zip(sides, walks)])
+        return Notch(weld, sides, pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
+                     np.tan(keys.minimum_contact_angle), new, joined)
 
     def equilibrium(self) -> Pore:
         """The equilibrium with the weld and the contact of ``start``."""
@@ -239,23 +311,26 @@ class Welding:
 
         Raises GrowthError if there is no equilibrium or the weld does not come to rest.
         """
-        shape = replace(self.grown, space=self.start.space, pressure=self.start.pressure)
-        tied = np.empty((0, 2), int) if self.reach else self._tied()
-        if not self.reach:
-            for notch in self._notches:
-                notch.predict(shape.mesh.points)
+        shape = self.grown  # other aggregates have their new shapes there
+        for number, region in zip(self.group, self._regions):
+            shape = shape.focused(number).placed(self.start.mesh.points[region.nodes],
+                                                 self.start.pressure[region.corner_nodes])
+        joined = [notch for notch in self._notches if not notch.new]
+        tied = np.concatenate([np.empty((0, 2), int), *(notch.tied for notch in joined)])
+        for notch in joined:
+            notch.predict(shape.mesh.points)
         for _ in range(CONTACT_ROUNDS):
             shape = self._joined(shape, tied)
             tied = self._tied()
             for notch in self._notches:
                 notch.advance(shape.mesh.points)
-            walls = [self._closing(shape, number) for number in range(2)]
+            walls = [self._closing(shape, number) for number in self.group]
             at_rest = np.array_equal(self._tied(), tied)
             if at_rest and not any((wall != FREE).any() for wall in walls):
                 return self._within_arcs(shape)
-            shape = replace(shape, bodies=tuple(
-                replace(body, wall=np.where(wall != FREE, wall, body.wall))
-                for wall, body in zip(walls, shape.bodies)))
+            for number, wall in zip(self.group, walls):
+                seen = shape.focused(number)
+                shape = seen.with_body(wall=np.where(wall != FREE, wall, seen.body.wall))
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
 
     def _within_arcs(self, shape: Pore) -> Expansion:
@@ -265,7 +340,7 @@ class Welding:
         shorter weld, or if its films are too thin.
         """
         entire = Expansion(self._marked(shape), self._iterations)
-        inside = [k for k, notch in enumerate(self._notches) if notch.joined and not self.reach]
+        inside = [k for k, notch in enumerate(self._notches) if notch.joined and not notch.new]
         if not inside:
             return entire
         too_short = np.zeros(len(inside))
@@ -303,40 +378,46 @@ class Welding:
         inside: indices of the notches; t: where their arcs are divided, from the line to the free
         surface.
         """
-        grown = replace(self.grown, bodies=tuple(
-            replace(body, wall=rest.wall, fixed=rest.fixed)
-            for body, rest in zip(self.grown.bodies, shape.bodies)))
+        grown = self.grown
+        for number in self.group:
+            rest = shape.bodies[number]
+            grown = grown.focused(number).with_body(wall=rest.wall, fixed=rest.fixed)
         points = shape.mesh.points
         pressure = shape.pressure
+        forces = self.forces
         divisions = []
-        for number in range(2):
-            arcs, at = zip(*[self._last_arc(k, number, part) for k, part in zip(inside, t)])
+        for side, number in enumerate(self.group):
+            own = [self._last_arc(k, side, part) for k, part in zip(inside, t)
+                   if side in self._notches[k].sides]
+            if not own:
+                continue
+            arcs, at = zip(*own)
             order = np.argsort(arcs)
             division = Division(grown.mesh, np.array(arcs)[order], np.array(at)[order], number)
             free = np.full(len(arcs), FREE)
             contact = Contact(grown.bodies[number].wall, division.arcs, division.t, free, free)
-            grown = divided(grown.focused(number), division, contact).focused(None)
+            grown = divided(grown.focused(number), division, contact)
             points = division.nodal(points)
             pressure = division.at_corners(pressure)
+            forces = None if forces is None else division.divided_loads(forces)
             divisions.append(division)
         start = replace(grown.moved(points), pressure=pressure)
-        trial = replace(self, grown=grown, start=start)
-        for k, notch in enumerate(self._notches):
+        trial = replace(self, grown=grown, start=start, forces=forces)
+        for k, (notch, (sides, walks)) in enumerate(zip(self._notches, trial._walks())):
             nodes = len(notch.pairs) + notch.size * (k in inside)
-            walks = welds.notches(*grown.outlines)[k]
-            pairs = np.column_stack([loop[walk[:nodes]] for loop, walk
-                                     in zip(grown.mesh.topology.loops, walks)])
+            pairs = np.column_stack([trial._loops[side][walk[:nodes]]
+                                     for side, walk in zip(sides, walks)])
             trial._notches[k] = replace(notch, pairs=pairs, before=grown.mesh.points[pairs])
         return trial, start, tuple(divisions)
 
-    def _last_arc(self, k: int, number: int, t: float) -> tuple[int, float]:
+    def _last_arc(self, k: int, side: int, t: float) -> tuple[int, float]:
         """The last joined arc of a notch on one outline, and the place along the loop that is
         ``t`` along the arc from the line."""
-        middle = self._notches[k].pairs[2 * self._notches[k].joined - 1, number]
-        loop = self.grown.mesh.topology.loops[number]
+        notch = self._notches[k]
+        middle, end = notch.tied[-2:, notch.sides.index(side)]
+        loop = self._loops[side]
         node = int(np.flatnonzero(loop == middle)[0])
-        forward = loop[(node + 1) % len(loop)] == self._notches[k].pairs[
-            2 * self._notches[k].joined, number]
+        forward = loop[(node + 1) % len(loop)] == end
         return node // 2, t if forward else 1 - t
 
     def _tied(self) -> np.ndarray:
@@ -367,40 +448,41 @@ class Welding:
         """
         grown = self.grown
         mesh = grown.mesh
-        union = Union.of(mesh, tied)
-        seen = [shape.focused(number) for number in range(2)]
+        union = Union.of(mesh, self._regions, tied)
+        seen = [shape.focused(number) for number in self.group]
         prescribed, target = self._prescribed(seen)
         if placed is not None:
             prescribed[placed] = True
             target[placed] = shape.mesh.points[placed].mean(axis=1)[:, None]
-        forces = None if self.forces is None else union.summed(mesh.body, self.forces)
         nodes = union.nodes
+        inside = np.unique(np.concatenate([region.nodes for region in self._regions]))
+        forces = None if self.forces is None else union.summed(inside, self.forces[inside])
+        target_J = [grown.bodies[number].strained[1] for number in self.group]
         rest = growth.equilibrium(
-            self._solid(union), mesh.by_triangle([body.strained[1] for body in grown.bodies]),
+            self._solid(union), mesh.by_triangle(target_J, self._regions),
             shape.mesh.points[nodes], shape.pressure[nodes[: union.corners]], prescribed[nodes],
             target[nodes], forces=forces, supports=self._supports(seen, union),
             modified_newton=self.mechanics.numerics.scheme.modified_newton, patient=self.patient)
         self._iterations += rest.iterations
-        points = shape.mesh.points.copy()
-        points[mesh.body] = rest.position[union.number[mesh.body]]
-        pressure = shape.pressure.copy()
-        corners = mesh.topology.body_corners
-        pressure[corners] = rest.pressure[union.number[corners]]
-        return replace(shape.moved(points), pressure=pressure)
+        for number, region in zip(self.group, self._regions):
+            shape = shape.focused(number).placed(rest.position[union.number[region.nodes]],
+                                                 rest.pressure[union.number[region.corner_nodes]])
+        return shape
 
     def _solid(self, union: Union) -> WeldedSolid:
         """The welded aggregates, with each triangle in the reference of its own aggregate."""
         mesh = self.grown.mesh
         reference = mesh.points.copy()
         in_triangles = []
-        for region, body in zip(mesh.regions, self.grown.bodies):
-            own = body.strained[0].reference
+        for region, number in zip(self._regions, self.group):
+            own = self.grown.bodies[number].strained[0].reference
             in_triangles.append(own[region.own_cells])
             reference[region.nodes] = own
         shape = Shape(union.cells, union.corners, self.grown.space.gradient_degree,
                       mesh.topology.method)
-        return WeldedSolid(shape, reference[union.nodes], energy=self.grown.bodies[0].solid.energy,
-                           in_triangles=mesh.by_triangle(in_triangles))
+        energy = self.grown.bodies[self.group[0]].solid.energy
+        return WeldedSolid(shape, reference[union.nodes], energy=energy,
+                           in_triangles=mesh.by_triangle(in_triangles, self._regions))
 
     def _prescribed(self, seen: Sequence[Pore]) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) True where a coordinate of a node is prescribed, and (N, 2) um, positions of the
@@ -408,7 +490,7 @@ class Welding:
         mesh = self.grown.mesh
         prescribed = np.zeros((len(mesh.points), 2), bool)
         target = seen[0].mesh.points.copy()
-        for number, (region, shape) in enumerate(zip(mesh.regions, seen)):
+        for number, region, shape in zip(self.group, self._regions, seen):
             locked, places = constraints(self.grown.focused(number), shape)
             prescribed[region.nodes] |= locked
             target[region.nodes] = np.where(locked, places, target[region.nodes])
@@ -417,11 +499,18 @@ class Welding:
     def _supports(self, seen: Sequence[Pore], union: Union) -> list[Support]:
         """The supports of all contact surfaces; seen: as for :meth:`_prescribed`."""
         supports = []
-        for region, body, shape in zip(self.grown.mesh.regions, self.grown.bodies, seen):
-            solid, _ = body.strained
-            supports += [Support(int(union.number[region.nodes[support.point]]),
-                                 union.summed(region.nodes, support.load))
-                         for support in surface_supports(solid, shape)]
+        for wall in self.grown.mesh.walls:
+            lengths = np.zeros(len(union.nodes))
+            points = []
+            for number, region, shape in zip(self.group, self._regions, seen):
+                outline = shape.boundary
+                solid, _ = self.grown.bodies[number].strained
+                edges = region.own_loop[outline.edges_on(wall.number)]
+                lengths += union.summed(region.nodes, lengths_along(edges, solid.reference))
+                fixed = outline.fixed & outline.touches(wall.number)
+                points.extend(union.number[region.loop[fixed]].tolist())
+            if lengths.any() and points:
+                supports.append(Support(points[0], lengths / lengths.sum()))
         return supports
 
     def _closing(self, shape: Pore, number: int) -> np.ndarray:
@@ -432,7 +521,7 @@ class Welding:
         seen = shape.focused(number)
         outline = seen.boundary
         keys = self.mechanics.keys
-        touched = tuple(wall for wall in seen.walls if (outline.wall == wall.number).any())
+        touched = tuple(wall for wall in seen.walls if outline.touches(wall.number).any())
         wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle)
         if outline.geometry == 2:
             middles = wall[1::2]
@@ -442,11 +531,12 @@ class Welding:
 
     def _marked(self, shape: Pore) -> Pore:
         """The pore with the nodes that have joined marked as welded."""
-        pairs = self._tied()
-        bodies = [replace(body, wall=np.where(np.isin(loop, pairs[:, number]), WELD, body.wall))
-                  for number, (body, loop) in enumerate(zip(shape.bodies,
-                                                            shape.mesh.topology.loops))]
-        marked = replace(shape, bodies=tuple(bodies))
-        for number in range(2):
-            marked = with_new_surfaces(marked.focused(number))
-        return marked.focused(None)
+        for side, (number, loop) in enumerate(zip(self.group, self._loops)):
+            seen = shape.focused(number)
+            wall = seen.body.wall
+            for notch in self._notches:
+                if side in notch.sides:
+                    joined = np.isin(loop, notch.tied[:, notch.sides.index(side)])
+                    wall = np.where(joined, touched(wall) + notch.weld, wall)
+            shape = seen.with_body(wall=wall)
+        return with_one_point(shape.focused(None), self.group)

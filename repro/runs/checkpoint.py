@@ -26,7 +26,7 @@ REFUSED = "checkpoint.refused"
 LAST = "checkpoint.last"
 #: The checkpoints from which an unfinished run resumes, the newest first.
 STATES = (NEWEST, PREVIOUS)
-KIND, FORMAT = b"dupin2001-repro checkpoint ", b"9"
+KIND, FORMAT = b"dupin2001-repro checkpoint ", b"10"
 MAGIC = KIND + FORMAT + b" "
 #: The array with the JSON text.
 PLAIN = "plain"

@@ -386,8 +386,9 @@ class Growth:
     meeting: str = choice(
         "weld", "end", source="Section 5, without a model",
         about="If two aggregates meet, they join and move together (weld), or the run ends (end). "
-              "They join only if there are exactly two, on opposite sliding walls, with curved "
-              "elements, without erosion and fluid forces. Otherwise the run ends")
+              "They join only if they are on opposite sliding walls, with curved elements, without "
+              "erosion, and if neither is welded or touches both walls already. Otherwise the run "
+              "ends")
     until: str = choice(
         "end", "steady",
         about="The run goes on to end, or ends early if the aggregates are steady")
@@ -618,17 +619,14 @@ class Scene:
 
     @property
     def without_weld(self) -> str:
-        """Why aggregates that meet end the run; empty if they join."""
+        """Why aggregates that meet end the run; empty if two on opposite walls join."""
         growth = self.growing.growth
         scheme = self.numerics.scheme
-        opposite = sorted(seed.wall for seed in self.aggregates) == ["lower", "upper"]
         reasons = {
             'growth.meeting is "end"': growth.meeting == "end",
-            "only two aggregates on opposite walls can join": not opposite,
             "a weld needs the curved elements and the midpoint rule of the preset fast":
                 not (scheme.controls_error and scheme.follows_layers),
             'growth.wall is "bonded"': growth.bonded,
-            'growth.fluid_forces is "included"': growth.has_fluid_forces,
             "the aggregates erode": growth.erosion is not None}
         return next((reason for reason, applies in reasons.items() if applies), "")
 

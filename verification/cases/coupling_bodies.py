@@ -193,7 +193,7 @@ def test_weld_cost(record):
     scene = load_scene("base", [with_preset("fast"), f"aggregate={seeds}", 'flow={mean_velocity="2.9 m/day"}',
                                 'growth.end="27 h"', 'output.times=["13 h", "27 h"]'])
     _, before, after = simulate(scene)
-    assert after.pore.welded and not before.pore.welded
+    assert after.pore.welds and not before.pore.welds
     record(at_most("nodes over those before the weld", len(after.pore.mesh.points) / len(before.pore.mesh.points),
                    MOST_NODES, "the aim"))
     computed = {"conductivity": after.solved.flow.conductivity,
