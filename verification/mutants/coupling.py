@@ -103,8 +103,8 @@ MUTANTS = (
         ("seat-always-below",
          "Elements beside contact are small at the upper wall, also if the seed sat there.",
          "_contact_sizes",
-         "outline.wall != outline.seat.wall",
-         "outline.wall != 1",
+         "wall != outline.seat.wall",
+         "wall != 1",
          "tests/test_walls.py::test_elements_beside_contact_are_small_at_the_wall_without_the_seed[upper]")),
     *changes(
         "repro/march/ends.py",
@@ -334,7 +334,7 @@ end = grown.step.pore"""),
         ("weld-closes-walls-without-contact",
          "A welded aggregate joins a wall that it does not touch, and encloses water.",
          "Welding._closing",
-         "(outline.wall == wall.number).any()",
+         "outline.touches(wall.number).any()",
          "True",
          f"{WELDS}a_film_at_a_wall_without_contact_stays_open"),
         ("weld-returns-the-others",
@@ -363,7 +363,7 @@ end = grown.step.pore"""),
          f"{WELDS}welded_aggregates_are_in_equilibrium_with_the_forces_of_the_water"),
         ("one-number-for-all-welds",
          "A second weld has the number of the first one.",
-         "join",
+         "_joined_along",
          "max([0, *(number for each in outlines for number in welds.welds_of(each.wall))])",
          "0",
          f"{WELDS}several_pairs_weld_one_after_the_other")),
@@ -465,7 +465,7 @@ end = grown.step.pore"""),
         "repro/model/support.py",
         ("support-uneven",
          "The traction along a sliding surface grows from one end to the other.",
-         "Support.on",
+         "lengths_along",
          "np.linalg.norm(slopes @ reference[edges], axis=2)",
          "np.linalg.norm(slopes @ reference[edges] ** 2, axis=2)",
          f"{SUPPORT_TESTS}simple_shear_between_two_walls_is_exact[2]"),
@@ -590,12 +590,12 @@ end = grown.step.pore"""),
          "surface_supports",
          "for wall in walls:\n"
          "    edges = rim[outline.edges_on(wall.number)]\n"
-         "    points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]\n"
+         "    points = rim[outline.fixed & outline.touches(wall.number) & (not wall.bonded)]\n"
          "    if len(edges) and len(points):\n"
          "        bearing.append(Support.on(int(points[0]), edges, body.reference))",
          "for wall in walls[:1]:\n"
          "    edges = rim[outline.edges_on(wall.number)]\n"
-         "    points = rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]\n"
+         "    points = rim[outline.fixed & outline.touches(wall.number) & (not wall.bonded)]\n"
          "    if len(edges) and len(points):\n"
          "        bearing.append(Support.on(int(points[0]), edges, body.reference))",
          f"{SUPPORT_TESTS}simple_shear_between_two_walls_is_exact[2]"),
@@ -608,8 +608,8 @@ end = grown.step.pore"""),
         ("bonded-wall-is-supported",
          "A bonded surface has the traction of a sliding one, too.",
          "surface_supports",
-         "rim[outline.fixed & (outline.wall == wall.number) & (not wall.bonded)]",
-         "rim[outline.fixed & (outline.wall == wall.number)]",
+         "rim[outline.fixed & outline.touches(wall.number) & (not wall.bonded)]",
+         "rim[outline.fixed & outline.touches(wall.number)]",
          f"{SUPPORT_TESTS}a_traction_acts_on_each_surface_that_slides[2-bonded-walls1]"),
         ("bonded-slides",
          "A bonded surface slides along the lower wall.",
