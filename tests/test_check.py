@@ -336,7 +336,7 @@ def test_check_describes_what_leaves_and_when_a_run_ends_early():
     """Nothing of it is said of a scene without it."""
     leaving = ["growth.bonding_strength=1e-3 MPa", "growth.after_detachment=continue", "growth.until=steady"]
     pair = [FAST, 'aggregate=[{radius="5 um"}, {radius="5 um", wall="upper"}]']
-    assert "; two aggregates on opposite walls that meet join, and the run goes on; strain" in dict(describe_model(
+    assert "; aggregates that meet join if this encloses no water, and the run goes on; strain" in dict(describe_model(
         load_scene("base", pair)))["growth"]
     assert 'aggregates that meet end the run, because growth.meeting is "end"' in dict(describe_model(
         load_scene("base", [*pair, "growth.meeting=end"])))["growth"]

@@ -21,9 +21,9 @@ wall or if erosion has worn it down, and the run continues. The run still ends i
 walls cannot hold the aggregate, or if erosion removes a contact surface: the model has no law for a
 surface that becomes free.
 
-With growth.meeting = "weld", two aggregates on opposite walls join when they meet
-(:mod:`repro.model.welding`), and the run continues. Otherwise the message gives the reason:
-:attr:`repro.Scene.without_weld`, or the walls that the two touch, or the weld that one of them has.
+With growth.meeting = "weld", two aggregates that meet join (:mod:`repro.model.welding`), and the run
+continues, unless their weld would enclose water (:func:`_apart`). Otherwise the message gives the
+reason, or :attr:`repro.Scene.without_weld`.
 
 With growth.until = "steady", a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
@@ -91,9 +91,10 @@ class PoreEnd(RunEnd):
 class Meeting(RunEnd):
     """Two aggregates meet: the film between them is thinner than ``growth.minimum_film``.
 
-    With ``growth.meeting = "weld"``, the default, two aggregates on opposite walls join instead,
-    and the run continues until one of them reaches the wall of the other one, or a third aggregate.
-    The former would enclose water.
+    With ``growth.meeting = "weld"``, the default, two aggregates join instead, and the run
+    continues, unless the weld would enclose water. Two aggregates on opposite walls enclose none.
+    Two on one wall enclose none if they meet at this wall. A run with a weld also ends if a welded
+    aggregate reaches a further wall.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the coordinates (um).

@@ -141,7 +141,7 @@ def _growth(scene: Scene) -> Iterator[str]:
     if len(scene.aggregates) > 1:
         reason = scene.without_weld
         yield (f"aggregates that meet end the run, because {reason}" if reason else
-               "two aggregates on opposite walls that meet join, and the run goes on")
+               "aggregates that meet join if this encloses no water, and the run goes on")
     if growth.erosion:
         yield f"free surfaces erode, by the law {growth.erosion.law}"
     if growth.until_steady:

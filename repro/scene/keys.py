@@ -619,7 +619,7 @@ class Scene:
 
     @property
     def without_weld(self) -> str:
-        """Why aggregates that meet end the run; empty if two on opposite walls join."""
+        """Why all aggregates that meet end the run; empty if some can join."""
         growth = self.growing.growth
         scheme = self.numerics.scheme
         reasons = {

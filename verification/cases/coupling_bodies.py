@@ -16,7 +16,7 @@ from repro.results.tables import Results
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_most, each_at_most
 from verification.problems.hard import clean_conductivity
-from verification.problems.runs import with_preset
+from verification.problems.runs import growth_rates, supplied_everywhere, with_preset
 
 #: Largest relative errors that presets promise until contact. The first aims, written before the errors were seen, were
 #: those of ``flow-gold``: 0.2, 0.05 and 0.01 % of the conductivity, and 0.2, 0.02 and 0.002 % of the others. They are
@@ -258,20 +258,21 @@ def _cost(kind: str, count: int) -> tuple[float, float, float]:
     return sum(seconds) / steps, flows.call_count / steps, solutions.call_count / steps
 
 
-#: Largest relative differences that the issue asks for until a quarter of the pore's length is welded. It asks for
-#: 0.05 % in `exact`, which was not run.
-WELD_AIMS = {"fast": 1e-2, "accurate": 2e-3}
-#: Accepted where an aim is missed: lengths of 3.9, 6.8 and 15.5 um differ by 0.73, 0.21 and 0.33 % in `accurate`. Lines
-#: of the plane err by 0.1 to 0.3 % in this preset (``growth-gold-contact``), and a weld does not become shorter.
-WELD_ACCEPTED = {("accurate", "length of the weld"): 1e-2}
+#: Largest relative differences that the issue asks for until a quarter of the pore's length is welded.
+WELD_AIMS = {"fast": 1e-2, "accurate": 2e-3, "exact": 5e-4}
+#: Accepted where an aim is missed: lengths of 3.9, 6.8 and 15.5 um differ by 0.73, 0.21 and 0.33 % in `accurate`, and
+#: by 0.74, 0.28 and 0.15 % in `exact`. Lines of the plane err by 0.1 to 0.3 % in `accurate` (``growth-gold-contact``),
+#: and a weld does not become shorter. In `exact` the conductivity differs by 0.045, 0.003 and 0.002 %, too close to its
+#: aim for a limit.
+WELD_ACCEPTED = {("accurate", "length of the weld"): 1e-2, ("exact", "length of the weld"): 1e-2,
+                 ("exact", "conductivity"): 7e-4}
 #: Length of that pore (um), and times (h) of its rows: the weld begins at 0.16 h and is as long as a quarter at 2.8 h.
 SHORT, WELDED = 60.0, (0.5, 1.5, 2.8)
 
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-weld", kind="property", runs_with="fast accurate",
-    omitted="exact: minutes for each hour. paper: the scene is refused",
+    "coupling-weld", kind="property", runs_with="fast accurate exact", omitted="paper: the scene is refused",
     mutants=("weld-slips", "weld-ends-at-corners"))
 @parametrize("preset, bound", {preset: (preset, bound) for preset, bound in WELD_AIMS.items()})
 def test_weld(preset, bound, record):
@@ -284,7 +285,8 @@ def test_weld(preset, bound, record):
     errors = {name: float(np.abs(whole[name] / half[name] - 1).max()) for name in half}
     for name, error in errors.items():
         limit = WELD_ACCEPTED.get((preset, name), bound)
-        record(at_most(name, error, limit, "the issue's bound" if limit == bound else "the issue's bound is missed"))
+        origin = "the issue's bound" if limit == bound else "the issue's bound is missed, or too close"
+        record(at_most(name, error, limit, origin))
 
 
 @cache
@@ -311,3 +313,50 @@ def _weld_scene(preset: str, pore: str):
     return load_scene("base", [
         with_preset(preset), f'growth.end="{WELDED[-1]} h"', f"output.times={times}", f'pore.length="{SHORT} um"',
         'flow.mean_velocity="2.9 m/day"', *of[pore]], unset=["flow.head"])
+
+
+#: Largest relative errors of lengths after uniform growth of two aggregates that have welded on one wall, written
+#: before the errors were seen: the aim for tips of ``growth-gold``.
+SCALED = 2e-4
+#: Accepted where the aim is missed. Until a new mesh is made, between 4 and 6 h, no length errs by more than 8e-5. The
+#: new mesh interpolates theta beside the line of the weld, where the strain is singular: the weld then is too low by
+#: 0.22, 0.075 and 0.12 %, and a tip errs by 0.021 % in `fast`.
+SCALED_ACCEPTED = {("fast", "height of the weld"): 4e-3, ("accurate", "height of the weld"): 1.5e-3,
+                   ("exact", "height of the weld"): 2e-3, ("fast", "downstream tip"): 4e-4}
+#: Hours of uniform growth after t = 0. The two meet within the first one.
+EVEN = (1.0, 4.0, 8.0)
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-weld-one-wall", kind="closed form", runs_with="fast accurate exact",
+    mutants=("two-fixed-points-of-one-surface", "weld-slips"), omitted="paper: the scene is refused")
+@parametrize("preset", {preset: (preset,) for preset in AIMS})
+def test_weld_on_one_wall(preset, record):
+    """Two aggregates that have welded on one wall grow evenly. The elastic strain of their union then does not change,
+    and all lengths from its fixed point grow like the root of theta.
+
+    Norm: relative errors of both tips, both thicknesses and the height of the weld, the largest of two states.
+    """
+    changes = [with_preset(preset), 'kinetics.decay_coefficient="0 1/d"', 'pore.width="60 um"', 'pore.length="300 um"',
+               'aggregate=[{radius="10 um", position="-11.1 um"}, {radius="8 um", position="9 um"}]']
+    scene = load_scene("base", changes)
+    rate, _ = growth_rates(scene.kinetics, scene.substrates)
+    hours = [f"{hour} h" for hour in EVEN]
+    scene = supplied_everywhere(load_scene("base", [*changes, f'growth.end="{hours[-1]}"', f"output.times={hours}"]))
+    first, *later = [report.pore for report in simulate(scene) if report.pore.time in EVEN]
+    assert first.welds == [(0, 1)]
+    for name, start in _lengths(first).items():
+        error = max(abs(_lengths(pore)[name] / start / np.exp(rate * (pore.time - first.time) / 2) - 1)
+                    for pore in later)
+        limit = SCALED_ACCEPTED.get((preset, name), SCALED)
+        origin = "the aim for tips of growth-gold" if limit == SCALED else "the aim is missed: new meshes at the line"
+        record(at_most(name, error, limit, origin))
+
+
+def _lengths(pore) -> dict[str, float]:
+    """Lengths (um) of two aggregates on the lower wall, along it from their fixed point."""
+    one, two = pore.outlines
+    (fixed,) = np.concatenate([outline.points[outline.fixed, 0] for outline in pore.outlines])
+    return {"upstream tip": fixed - one.upstream, "downstream tip": two.downstream - fixed, "thickness": one.thickness,
+            "thickness of the other": two.thickness, "height of the weld": one.points[one.wall >= WELD, 1].max()}
