@@ -134,8 +134,7 @@ class Outline:
 
     @property
     def edge_wall(self) -> np.ndarray:
-        """Number of the wall that each edge lies on or of its weld; FREE where it borders the fluid.
-        """
+        """Number of the wall or weld on which each edge lies; FREE where it borders the fluid."""
         first, middle, last = self.arcs(self.wall).T
         return np.where((first == middle) | (last == middle), middle, FREE).astype(int)
 

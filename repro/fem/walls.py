@@ -24,8 +24,8 @@ import numpy as np
 FREE = 0
 BOTTOM = 1
 TOP = 2
-#: Number of the first weld: a surface that two aggregates share. Further welds have multiples of it.
-#: A node on a wall and a weld has the sum of both numbers.
+#: Number of the first weld: a surface that two aggregates share. Numbers of further welds are
+#: multiples of it. A node on a wall and a weld has the sum of both numbers.
 WELD = 3
 
 

@@ -21,9 +21,9 @@ wall or if erosion has worn it down, and the run continues. The run still ends i
 walls cannot hold the aggregate, or if erosion removes a contact surface: the model has no law for a
 surface that becomes free.
 
-With growth.meeting = "weld", two aggregates that meet join (:mod:`repro.model.welding`), and the run
-continues, unless their weld would enclose water (:func:`_apart`). Otherwise the message gives the
-reason, or :attr:`repro.Scene.without_weld`.
+With growth.meeting = "weld", two aggregates that meet join (:mod:`repro.model.welding`), and the
+run continues, unless their weld would enclose water (:func:`_apart`). Otherwise the message gives
+the reason, or :attr:`repro.Scene.without_weld`.
 
 With growth.until = "steady", a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.

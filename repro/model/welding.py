@@ -127,9 +127,9 @@ class Notch:
     nodes of the mesh, from the line on; before: (k, 2, 2) um, their positions in the old shape;
     size: number of nodes from corner to corner; film: least film (um); slope: tangent of the least
     angle; new: have the two aggregates just met? joined: number of pairs of corners beyond the old
-    line that have joined, in the present trial; last_too_few: largest number of pairs for which a film is too
-    thin; first_enough: smallest number for which no film is too thin; step: the next trial has
-    at most this many pairs fewer.
+    line that have joined, in the present trial; last_too_few: largest number of pairs for which a
+    film is too thin; first_enough: smallest number for which no film is too thin; step: the next
+    trial has at most this many pairs fewer.
     """
 
     weld: int

@@ -17,7 +17,7 @@ RUN_ENDS = (re.compile(f"{AGGREGATE} reaches the pore's (?:up|down)stream end "
             re.compile(f"{AGGREGATE} is eroded at {TIME}: .*"),
             re.compile(f"erosion takes a contact surface at y = .* um in the step from {TIME}"),
             re.compile(f"the aggregates are steady at {TIME}: .*"),
-            re.compile(rf"aggregates \S+(?: and \S+)+ meet (?:at|in the step from) {TIME}(?:: .*)?"))
+            re.compile(rf"aggregates .* and \S+ meet (?:at|in the step from) {TIME}(?:: .*)?"))
 
 
 def is_fold(status: str) -> bool:

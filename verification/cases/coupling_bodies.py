@@ -329,7 +329,7 @@ EVEN = (1.0, 4.0, 8.0)
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "coupling-weld-one-wall", kind="closed form", runs_with="fast accurate exact",
+    "coupling-weld-one-wall", kind="exact", runs_with="fast accurate exact",
     mutants=("two-fixed-points-of-one-surface", "weld-slips"), omitted="paper: the scene is refused")
 @parametrize("preset", {preset: (preset,) for preset in AIMS})
 def test_weld_on_one_wall(preset, record):
