@@ -103,7 +103,7 @@ def test_other_files_are_refused(content):
 
 def test_a_checkpoint_of_another_format_or_scene_is_refused_in_one_line(saved, tmp_path):
     old = checkpoint.KIND + b"2 " + saved[2].removeprefix(checkpoint.MAGIC)
-    with pytest.raises(CheckpointError, match="^its format is not 9: another version wrote it$"):
+    with pytest.raises(CheckpointError, match="^its format is not 10: another version wrote it$"):
         restored(saved, old, tmp_path / "x")
     with pytest.raises(CheckpointError, match="another scene"):
         restored((load_scene("flow_only"), *saved[1:]), saved[2], tmp_path / "x")

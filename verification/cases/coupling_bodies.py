@@ -330,7 +330,7 @@ EVEN = (1.0, 4.0, 8.0)
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-weld-one-wall", kind="exact", runs_with="fast accurate exact",
-    mutants=("two-fixed-points-of-one-surface", "weld-slips"), omitted="paper: the scene is refused")
+    mutants=("weld-slips",), omitted="paper: the scene is refused")
 @parametrize("preset", {preset: (preset,) for preset in AIMS})
 def test_weld_on_one_wall(preset, record):
     """Two aggregates that have welded on one wall grow evenly. The elastic strain of their union then does not change,
