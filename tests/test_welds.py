@@ -375,6 +375,7 @@ def test_two_aggregates_on_one_wall_become_one_that_only_scales(seeds):
         (fixed,), = [x for x in (outline.points[outline.fixed, 0] for outline in outlines) if len(x)]
         weld = [wall.gap(outline.points[outline.wall >= WELD]).max() for outline in outlines]
         assert weld[0] == weld[1] > 1.8
+        assert all(wall.gap(outline.points[outline.wall >= WELD]).min() == 0 for outline in outlines)
         tips = [outline.upstream - fixed for outline in outlines] + [outline.downstream - fixed for outline in outlines]
         lengths.append([*weld, *tips, *(outline.thickness for outline in outlines),
                         *(np.sqrt(outline.area) for outline in outlines)])
