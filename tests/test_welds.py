@@ -413,8 +413,8 @@ def test_a_weld_at_a_wall_needs_the_thinnest_film_there(gap, joins):
 
 def test_aggregates_that_meet_say_why_they_do_not_join():
     pore = last_of(LOWER, FAR_UPPER, UPPER, FAR_LOWER).pore
-    film = 2.0
+    film, _ = pore.outlines[0].film(pore.outlines[3])
     assert _apart(pore, (0, 2), film) == "this would enclose water beside a weld"
-    assert _apart(pore, (0, 1), film) == "this would enclose water between them and a wall", "both are plugs"
+    assert _apart(pore, (0, 3), film) == "this would enclose water between them and a wall", "both are plugs"
     alone = at_start(LOWER, FAR_UPPER)
     assert _apart(alone, (0, 1), film) == _apart(alone, (1, 0), film) == ""

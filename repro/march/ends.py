@@ -333,7 +333,7 @@ def _apart(pore: Pore, pair: tuple[int, int], film: float) -> str:
     if any({*pair} <= {*group} for group in pore.groups):
         return "this would enclose water beside a weld"
     walls = pore.common_walls(pair)
-    if len(walls) > 1 or walls and _between_lines(pore, pair, *walls) > (1 + CLOSE) * film:
+    if len(walls) > 1 or walls and _between_lines(pore, pair, walls[0]) > (1 + CLOSE) * film:
         return "this would enclose water between them and a wall"
     return ""
 

@@ -404,7 +404,7 @@ end = grown.step.pore"""),
         ("weld-above-a-wall",
          "Two aggregates on one wall join above water.",
          "_apart",
-         "_between_lines(pore, pair, *walls) > (1 + CLOSE) * film",
+         "_between_lines(pore, pair, walls[0]) > (1 + CLOSE) * film",
          "False",
          f"{WELDS}a_weld_at_a_wall_needs_the_thinnest_film_there[1.01-False]")),
     *changes(
