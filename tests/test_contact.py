@@ -242,8 +242,8 @@ def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
 
 
 def test_lines_advance_the_farther_the_more_biomass_grows(plugged):
-    """A line that rests too far beyond the corner at 0.62 um would not move if more biomass grows."""
-    factors = (1.011, 1.012, 1.013, 1.015, 1.017, 1.019)
+    """A line that rests too far beside the corner at 2.1 um would not move if more biomass grows."""
+    factors = (1.062, 1.065, 1.068, 1.071, 1.074, 1.077)
     advances = [expanded_by(*plugged, factor).advances[0, TOP, 1] for factor in factors]
     assert (np.diff(advances) > 0.01).all()
     assert np.interp(factors, factors[::5], advances[::5]) == pytest.approx(advances, abs=0.1)

@@ -160,7 +160,7 @@ def check_apart(outlines: Sequence[Outline]) -> None:
         raise MeshError("two welded aggregates touch outside their weld")
     for outline, other in combinations(united, 2):
         if shapely.Polygon(outline.points).intersects(shapely.Polygon(other.points)):
-            raise MeshError("two aggregates touch, and contact is modelled only with walls")
+            raise MeshError("two aggregates touch outside a weld")
 
 
 def _boundaries(outlines: Sequence[Outline], ends: tuple[float, float],

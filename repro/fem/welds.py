@@ -328,8 +328,8 @@ def _line_size(sizing: Sizing) -> float:
 
 def in_notch(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
              film: float) -> list[np.ndarray]:
-    """The first nodes of ``walks`` on both outlines: those with opposite corners, as far as the
-    film between them is thinner than MATCHED_FILMS times the least one, ``film`` (um)."""
+    """The first nodes of ``walks`` on both outlines. They end where corners are no longer opposite,
+    or where the film between them exceeds MATCHED_FILMS times ``film`` (um), the least one."""
     lengths = [lengths_from(outline, walk) for outline, walk in zip(outlines, walks)]
     reach = _reach(outlines, walks, lengths, MATCHED_FILMS * film)
     count = min(opposite_corners(*lengths), int(np.count_nonzero(lengths[0] <= reach)))
@@ -398,7 +398,7 @@ def facing(first: Outline, second: Outline, reach: float, weld: int = WELD,
 def _line_beside(outline: Outline, other: Outline, wall: int) -> tuple[int, float]:
     """(edge, t) of the contact line with a wall that is nearest to another outline."""
     on = np.flatnonzero(outline.touches(wall))
-    apart = np.abs(outline.points[on, 0] - 0.5 * (other.upstream + other.downstream))
+    apart = np.abs(outline.points[on, 0] - other.points[other.touches(wall), 0].mean())
     return int(on[np.argmin(apart)]) // outline.geometry, 0.0
 
 

@@ -6,8 +6,8 @@ Each end is an event with a margin: zero at the event and positive after it.
     tearing       largest tensile stress / growth.tensile_strength - 1
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
-    meeting       1 - film between two aggregates / growth.minimum_film, or, if they are welded to
-                  each other, between one of them and the wall of the other one
+    meeting       1 - film / growth.minimum_film, for the film between two aggregates, or between a
+                  welded one and a wall that it does not touch
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the
@@ -22,8 +22,8 @@ walls cannot hold the aggregate, or if erosion removes a contact surface: the mo
 surface that becomes free.
 
 With growth.meeting = "weld", two aggregates that meet join (:mod:`repro.model.welding`), and the
-run continues, unless their weld would enclose water (:func:`_apart`). Otherwise the message gives
-the reason, or :attr:`repro.Scene.without_weld`.
+run continues. If their weld would enclose water, or if :attr:`repro.Scene.without_weld` gives a
+reason, the run ends, and its message says why.
 
 With growth.until = "steady", a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
@@ -179,14 +179,13 @@ class Reached:
         """Time (h) of the end of the step."""
         return self.step.pore.time
 
-    def unlocated(self, after: float, error: Exception) -> Reached:
-        """The same, with a message that the event is not located because a shorter step fails.
+    def unlocated(self, after: float, reason: str) -> Reached:
+        """The same, with a message that the event is not located, and the reason.
 
         after: h, the last time before the event.
         """
         end = self.event.end
-        text = (f"{end}; it may happen earlier, after t = {after:g} h, since a shorter step fails: "
-                f"{error}")
+        text = f"{end}; it may happen earlier, after t = {after:g} h, since {reason}"
         return replace(self, event=replace(self.event, end=type(end)(text)))
 
     @property
@@ -313,7 +312,8 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
     """The events of all pairs of aggregates."""
     least = ends.loading.growth.minimum_film
     for pair, film, (x, y) in _films(pore):
-        reason = ends.without_weld or _apart(pore, pair, film)
+        thin = (1 + ends.loading.numerics.tolerance) * film
+        reason = ends.without_weld or _reason_against_weld(pore, pair, thin)
         end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g}, "
                       f"y = {y:.4g} um the film between them is {film:.3g} um, and it closes below "
                       f"growth.minimum_film, {least:g} um; {reason}")
@@ -323,17 +323,17 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
             yield from _further_contacts(least, pore, group)
 
 
-def _apart(pore: Pore, pair: tuple[int, int], film: float) -> str:
-    """Why two aggregates that meet do not join; empty if they join; film: um, the least one between
-    them.
+def _reason_against_weld(pore: Pore, pair: tuple[int, int], thin: float) -> str:
+    """Why two aggregates that meet do not join; empty if they join.
 
-    A weld must not enclose water. So the two, with those to which they are welded, have no wall in
-    common, or they meet at their only common wall.
+    thin: um, a film at a wall up to this counts as the thinnest one between them. A weld must not
+    enclose water. So the two, with those to which they are welded, have no wall in common, or they
+    meet at their only common wall.
     """
     if any({*pair} <= {*group} for group in pore.groups):
         return "this would enclose water beside a weld"
     walls = pore.common_walls(pair)
-    if len(walls) > 1 or walls and _between_lines(pore, pair, walls[0]) > (1 + CLOSE) * film:
+    if len(walls) > 1 or walls and _between_lines(pore, pair, walls[0]) > thin:
         return "this would enclose water between them and a wall"
     return ""
 
@@ -442,9 +442,9 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
     -------
     Reached
         The step to the event. Its margin is positive and at most CLOSE, unless the margin jumps
-        there. If the margin falls from one trial to a later time, the meshes of the trials differ,
-        and the fall is an error: a margin up to the largest fall ends the search. If a shorter step
-        fails, the result is the shortest step that has passed the event, and the message says so.
+        there. A margin that is lower in a later trial shows the noise of different meshes. The
+        search stops when the margin is below the largest such fall, or if a shorter step fails. The
+        result is then the shortest step that has passed the event, and the message says so.
     """
     low, high = margin - CLOSE / 2, passed.event.margin - CLOSE / 2
     side = 0
@@ -458,7 +458,7 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
         try:
             trial = reach(start + part * interval)
         except (RunEnd, StageError, FloatingPointError) as error:
-            return passed.unlocated(start, error)
+            return passed.unlocated(start, f"a shorter step fails: {error}")
         found = trial.event.margin
         value = found - CLOSE / 2
         close = max(close, below - found, found - above)
@@ -470,4 +470,6 @@ def locate(reach: Callable[[float], Reached], start: float, margin: float,
             start, low, below = trial.time, value, found
             high *= 0.5 if side < 0 else 1.0
             side = -1
+    if CLOSE < passed.event.margin <= close:
+        return passed.unlocated(start, f"its margin varies by {close:.1g} from mesh to mesh")
     return passed

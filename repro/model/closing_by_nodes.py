@@ -12,7 +12,7 @@ import numpy as np
 
 from repro.errors import GrowthError
 from repro.fem.outline import Outline
-from repro.fem.walls import FREE, Walls
+from repro.fem.walls import FREE, Walls, touched
 from repro.model.contact_lines import surface_ends
 from repro.model.mechanics import CONTACT_ROUNDS, Closing, Expansion, equilibrium, with_new_surfaces
 
@@ -80,7 +80,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     apart = x[walk] - x[line]
     # Free nodes end at another line. If that is on the same wall, nodes belong to the nearer line.
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
-    if outline.wall[other] != outline.wall[line]:
+    if touched(outline.wall[other]) != touched(outline.wall[line]):
         nearer = np.ones(len(walk), bool)
     along = np.sign(x[line] - x[(line - step) % count]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))

@@ -378,8 +378,8 @@ def advances_at(by_line: np.ndarray, number: int,
 
 def lines_of(outline: Outline) -> list[Line]:
     """All contact lines of an outline, in the order of the numbers of their walls."""
-    walls = np.unique(touched(outline.wall[outline.wall != FREE])).tolist()
-    return [Line(wall, node, direction) for wall in walls
+    walls = set(touched(outline.wall).tolist()) - {FREE}
+    return [Line(wall, node, direction) for wall in sorted(walls)
             for node, direction in surface_ends(outline, wall)]
 
 

@@ -14,7 +14,7 @@ from repro.fem.brief import brief
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
 from repro.fem.space import Space
-from repro.fem.walls import Walls
+from repro.fem.walls import FREE, Walls, touched
 from repro.model.body import Body
 from repro.scene import needed
 
@@ -65,20 +65,22 @@ class Pore:
 
     @property
     def contact(self) -> bool:
-        """Does an aggregate touch both walls, or its wall and another aggregate?"""
-        return self.spanning > 0
+        """Do aggregates plug the pore: does one touch both walls, with those welded to it?"""
+        return any(len({wall for number in group
+                        for wall in touched(self.bodies[number].wall).tolist()} - {FREE}) > 1
+                   for group in self.groups)
 
     @property
     def spanning(self) -> int:
         """Number of aggregates that touch both walls, or their wall and another aggregate."""
         return sum(body.spans for body in self.bodies)
 
-    @property
+    @cached_property
     def welds(self) -> list[tuple[int, int]]:
         """Indices of the two aggregates of each weld."""
         return welds.pairs([body.wall for body in self.bodies])
 
-    @property
+    @cached_property
     def groups(self) -> list[tuple[int, ...]]:
         """Indices of the aggregates that move together: one alone, or all that are welded."""
         group_of = list(range(len(self.bodies)))

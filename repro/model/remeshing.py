@@ -106,7 +106,7 @@ def new_mesh(rules: Remeshing, previous: Pore, expanded: Pore, speed: float,
 
 
 def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) -> Pore | None:
-    """Expanded aggregates on a mesh that the same step has generated for other shapes.
+    """Expanded aggregates on a mesh that steps from the same start have generated.
 
     The mesh moves with the material. Returns None if the contact differs or if the moved mesh is
     not acceptable. It may have as many poor triangles as the generated one: in an acute corner

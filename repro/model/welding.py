@@ -21,7 +21,7 @@ from math import ceil, inf, log2
 
 import numpy as np
 
-from repro.errors import GrowthError, LinearError
+from repro.errors import GrowthError, LinearError, MeshError
 from repro.fem import welds
 from repro.fem.division import Division
 from repro.fem.forms import Basis, basis
@@ -67,12 +67,12 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, in
 
     The weld extends by the thickness of the least film on each side of the nearest points, or from
     the wall that both aggregates touch; if there is then no equilibrium, by half of this length, or
-    a quarter. speed: as for :func:`remeshing.remesh`. Raises GrowthError or MeshError.
+    a quarter. speed: as for :func:`remeshing.remesh`. Raises GrowthError, LinearError or MeshError.
     """
     for length in mechanics.keys.minimum_film * FIRST_LENGTHS:
         try:
             return _joined_along(mechanics, rules, pore, pair, speed, length)
-        except (GrowthError, LinearError) as error:
+        except (GrowthError, LinearError, MeshError) as error:
             failure = error
     raise failure
 

@@ -386,9 +386,8 @@ class Growth:
     meeting: str = choice(
         "weld", "end", source="Section 5, without a model",
         about="If two aggregates meet, they join and move together (weld), or the run ends (end). "
-              "They join only if they are on opposite sliding walls, with curved elements, without "
-              "erosion, and if neither is welded or touches both walls already. Otherwise the run "
-              "ends")
+              "They join only if this encloses no water, on sliding walls, with curved elements, "
+              "without erosion. Otherwise the run ends")
     until: str = choice(
         "end", "steady",
         about="The run goes on to end, or ends early if the aggregates are steady")
