@@ -14,18 +14,21 @@ CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
-def surface_stretch(points, cells, aggregate, before):
+def surface_stretch(points, cells, aggregate, before, others=None):
     """Compute (stretch, distance, midpoints) of the free edges, (e, 2), (e,) and (e, 2).
 
     The columns of the stretch are its mean over an edge and its value in the middle. The distance is that to the nearer
     end of the free surface, along the chords of its edges and relative to their length. points: (N, 2); cells: (T, 3 or
     6), corners counterclockwise, then the midpoints of the edges 01, 12 and 20; aggregate: (T,) True in the aggregate;
-    before: (N, 2) positions at t = 0.
+    before: (N, 2) positions at t = 0; others: (T,) True in other aggregates. Nodes of a weld have another position at
+    t = 0 in the other aggregate, so edges of triangles with such a node are left out.
     """
+    others = np.zeros(len(cells), bool) if others is None else others
+    welded = np.isin(cells, cells[others]).any(axis=1)
     ends = np.sort(cells[:, EDGES[:, :2]], axis=2)
-    fluid_edges = {tuple(pair) for pair in ends[~aggregate].reshape(-1, 2).tolist()}
+    fluid_edges = {tuple(pair) for pair in ends[~(aggregate | others)].reshape(-1, 2).tolist()}
     free = {}
-    for cell in np.flatnonzero(aggregate):
+    for cell in np.flatnonzero(aggregate & ~welded):
         for local in range(3):
             if tuple(ends[cell, local].tolist()) in fluid_edges:
                 free[int(cells[cell, EDGES[local, 0]])] = (cell, local)

@@ -201,7 +201,9 @@ def _independent_stretch(grid) -> np.ndarray:
     region = grid.cell_data["region"]
     least = []
     for number in np.unique(region[region > 0]):
-        stretch, distance, _ = surface_stretch.surface_stretch(grid.points[:, :2], grid.cells, region == number, before)
+        own = region == number
+        stretch, distance, _ = surface_stretch.surface_stretch(grid.points[:, :2], grid.cells, own, before,
+                                                               (region > 0) & ~own)
         least.append(surface_stretch.least(stretch, distance, BESIDE))
     return np.min(least, axis=0)
 
