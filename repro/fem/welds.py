@@ -374,8 +374,8 @@ def facing(first: Outline, second: Outline, reach: float, weld: int = WELD,
     """The same curves with new corners: one at the point nearest to the other curve, marked as a
     weld with the number ``weld``, and one at the arc length ``reach`` (um) on each side of it.
 
-    wall: number of the wall that both aggregates touch, if any; the points are then the contact
-    lines there that face each other.
+    wall: number of a wall that both aggregates touch. The points are then the contact lines with
+    this wall that face each other.
     """
     places = _nearest(first, second) if wall == FREE else (
         [_line_beside(first, second, wall), _line_beside(second, first, wall)])

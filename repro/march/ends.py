@@ -326,11 +326,12 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
 def _reason_against_weld(pore: Pore, pair: tuple[int, int], thin: float) -> str:
     """Why two aggregates that meet do not join; empty if they join.
 
-    thin: um, a film at a wall up to this counts as the thinnest one between them. A weld must not
-    enclose water. So the two, with those to which they are welded, have no wall in common, or they
-    meet at their only common wall.
+    thin: um; two aggregates meet at a wall if the film between them there is at most as thick. A
+    weld must not enclose water. So the groups of the two have no wall in common, or the two meet at
+    the only common wall.
     """
-    if any({*pair} <= {*group} for group in pore.groups):
+    first, second = pair
+    if pore.group_of(first) == pore.group_of(second):
         return "this would enclose water beside a weld"
     walls = pore.common_walls(pair)
     if len(walls) > 1 or walls and _between_lines(pore, pair, walls[0]) > thin:
@@ -356,8 +357,8 @@ def _further_contacts(least: float, pore: Pore, group: tuple[int, ...]) -> Itera
         outline = pore.outlines[number]
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
-            touched = any(pore.outlines[other].touches(wall.number).any() for other in group)
-            reason = ("this would enclose water beside a weld" if touched else
+            reason = ("this would enclose water beside a weld"
+                      if wall.number in pore.walls_of(group) else
                       "the model has no further contact of welded aggregates")
             end = Meeting(f"{_names(pore, group)} meet at t = {pore.time:g} h: near x = {x:.4g} um "
                           f"the film between aggregate {pore.bodies[number].name} and the wall "

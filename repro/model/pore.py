@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -66,9 +66,7 @@ class Pore:
     @property
     def contact(self) -> bool:
         """Do aggregates plug the pore: does one touch both walls, with those welded to it?"""
-        return any(len({wall for number in group
-                        for wall in touched(self.bodies[number].wall).tolist()} - {FREE}) > 1
-                   for group in self.groups)
+        return any(len(self.walls_of(group)) > 1 for group in self.groups)
 
     @property
     def spanning(self) -> int:
@@ -90,12 +88,19 @@ class Pore:
         return [tuple(number for number, own in enumerate(group_of) if own == group)
                 for group in sorted(set(group_of))]
 
-    def common_walls(self, pair: tuple[int, int]) -> tuple[int, ...]:
+    def group_of(self, number: int) -> tuple[int, ...]:
+        """The group of an aggregate; number: its index."""
+        return next(group for group in self.groups if number in group)
+
+    def walls_of(self, group: Sequence[int]) -> set[int]:
+        """Numbers of the walls that the aggregates of a group touch."""
+        numbers = (touched(self.bodies[number].wall).tolist() for number in group)
+        return set().union(*numbers) - {FREE}
+
+    def common_walls(self, pair: tuple[int, int]) -> list[int]:
         """Numbers of the walls that the groups of two aggregates both touch."""
-        first, second = (next(group for group in self.groups if number in group) for number in pair)
-        return tuple(wall.number for wall in self.mesh.walls if all(
-            any(self.outlines[number].touches(wall.number).any() for number in group)
-            for group in (first, second)))
+        first, second = (self.walls_of(self.group_of(number)) for number in pair)
+        return sorted(first & second)
 
     @property
     def accumulates(self) -> bool:

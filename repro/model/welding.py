@@ -65,9 +65,10 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, in
          speed: float) -> Pore:
     """The pore after two aggregates have met and joined; pair: their indices.
 
-    The weld extends by the thickness of the least film on each side of the nearest points, or from
-    the wall that both aggregates touch; if there is then no equilibrium, by half of this length, or
-    a quarter. speed: as for :func:`remeshing.remesh`. Raises GrowthError, LinearError or MeshError.
+    The weld begins at the nearest points, and extends by the thickness of the least film on each
+    side. If both aggregates touch a wall, it extends from this wall. If there is no equilibrium
+    with this length, the weld has half of it, or a quarter. speed: as for
+    :func:`remeshing.remesh`. Raises GrowthError, LinearError or MeshError.
     """
     for length in mechanics.keys.minimum_film * FIRST_LENGTHS:
         try:
@@ -87,7 +88,7 @@ def _joined_along(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tupl
     outlines[first], outlines[second] = welds.facing(
         outlines[first], outlines[second], length, weld, wall)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
-    group = next(group for group in facing.groups if first in group)
+    group = facing.group_of(first)
     facing = with_one_point(facing, group)
     shape = Welding(mechanics, facing, facing, group, reach=length).close()
     return remeshing.remesh(rules, facing, shape.pore, speed)[0]
@@ -96,8 +97,8 @@ def _joined_along(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tupl
 def with_one_point(pore: Pore, group: Sequence[int]) -> Pore:
     """The pore with one fixed point on each wall that welded aggregates touch (2.3.3).
 
-    Their contact surfaces with one wall are one surface. If it has not exactly one fixed point, the
-    corner nearest to its middle becomes the point.
+    Their contact surfaces with one wall are one surface. It keeps its only fixed point. If it has
+    none or two, the corner nearest to its middle becomes the fixed point.
     """
     fixed = {number: pore.bodies[number].fixed for number in group}
     for wall in pore.mesh.walls:

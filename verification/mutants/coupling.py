@@ -306,8 +306,7 @@ end = grown.step.pore"""),
         ("water-passes-no-weld",
          "Two aggregates that are welded on one wall count as a plug.",
          "Pore.contact",
-         "len({wall for number in group"
-         "     for wall in touched(self.bodies[number].wall).tolist()} - {FREE}) > 1",
+         "len(self.walls_of(group)) > 1",
          "len(group) > 1",
          f"{WELDS}two_aggregates_on_one_wall_become_one_that_only_scales[lower]")),
     *changes(
