@@ -208,14 +208,18 @@ MUTANTS = (
         ("quadrature-of-degree-2",
          "Products of quadratic functions are integrated by a rule of degree 2.",
          "",
-         "Element(ElementTriP2(), degree=6, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
-         "Element(ElementTriP2(), degree=2, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
+         "Curved(ElementTriP2(), degree=6, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
+         "Curved(ElementTriP2(), degree=2, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
          "tests/test_mesh.py::test_products_of_two_functions_are_integrated_exactly[straight sides]"),
         ("quadrature-of-straight-triangles",
          "Products of quadratic functions are integrated beside arcs as on straight triangles.",
          "",
-         "Element(ElementTriP2(), degree=6, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
-         "Element(ElementTriP2(), degree=4, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
+         "Curved(ElementTriP2(), degree=6, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
+         "Curved(ElementTriP2(), degree=4, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
          "tests/test_mesh.py::test_products_of_two_functions_are_integrated_exactly[made]")),
     *changes(
         "repro/fem/space.py",
