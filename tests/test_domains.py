@@ -70,7 +70,7 @@ def stirred(law, substrates):
     scene = load_scene("base", [*FAST, f"kinetics.law={law}"], unset=unset)
     pore = seeded(scene)
     carried = Solver.of(scene).solve_flow(pore.space, scene.flow)
-    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
+    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics, scene.numerics.scheme)
 
 
 LAWS_AND_SUBSTRATES = pytest.mark.parametrize("law, substrates", [

@@ -33,7 +33,7 @@ def case(radius="20 um", velocity="2.9 m/day", boundary="open", order=1, **secti
                              **{**sections, "substrates": {"acceptor": {}, "donor": {}, **substrates}})
     pore = seeded(scene)
     carried = Solver.of(scene).solve_flow(pore.space, scene.flow) if scene.flow else None
-    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
+    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics, scene.numerics.scheme)
 
 
 def storage(problem):
@@ -62,7 +62,7 @@ def supplied(problem, acceptor):
     """Return the same problem with another supply of the acceptor (mg/L)."""
     substrates = problem.substrates
     other = replace(substrates, acceptor=replace(substrates.acceptor, supply=acceptor))
-    return transport.problem(problem.space, None, other, problem.law.constants)
+    return transport.problem(problem.space, None, other, problem.law.constants, problem.scheme)
 
 
 @EVERY_ORDER

@@ -97,6 +97,11 @@ class Linear:
     tau: np.ndarray
 
     @staticmethod
+    def splits(resistance: Resistance) -> bool:
+        """May the pressure jump across the interface? With tau each corner has one pressure."""
+        return False
+
+    @staticmethod
     def on(velocity: Space, viscosity: np.ndarray) -> Linear:
         """The pair with the paper's stabilisation; viscosity: (T,) nu_r."""
         return Linear(velocity, tau(velocity.mesh, viscosity))
@@ -132,6 +137,11 @@ class TaylorHood:
 
     velocity: Space
     lower: None = None
+
+    @staticmethod
+    def splits(resistance: Resistance) -> bool:
+        """May the pressure jump across the interface? Each side then has its own pressure."""
+        return resistance.pressure_jumps
 
     @staticmethod
     def on(velocity: Space, viscosity: np.ndarray) -> TaylorHood:
@@ -180,11 +190,12 @@ def unit_flow(velocity: Space, resistance: Resistance = WATER, *,
               interface: Interface = LAPLACIAN) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`."""
     mesh = velocity.mesh
-    splits = velocity.order > 1 and resistance.pressure_jumps
+    kind = PAIRS[velocity.order]
+    splits = kind.splits(resistance)
     system = mesh.topology.system(("flow", interface, splits),
                                   lambda: _system(velocity, interface, splits))
     system, viscosity, drag = resistance.terms(velocity, system)
-    pair = PAIRS[velocity.order].on(velocity, viscosity)
+    pair = kind.on(velocity, viscosity)
     blocks = stokes(velocity, viscosity, interface, pair.lower, drag)
     value = np.zeros(len(system.constrained))
     value[: 2 * velocity.count] = pair.prescribed()

@@ -39,7 +39,6 @@ from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
 from repro.model.kinetics import Sink
 from repro.model.transport import (
-    UNRESOLVED,
     Concentrations,
     Flows,
     Problem,
@@ -55,9 +54,6 @@ from repro.timing import timed
 #: biomass made or uptake is 2e-2 at a tolerance of 1e-1, 9e-4 at 1e-2, and 3.1e-4 at 1e-3. The
 #: tolerance therefore stays at 0.1 %.
 TOLERANCE = 1e-3
-#: {order of the elements: part of its supply by which a concentration may be below zero}. With
-#: linear elements the lumped reaction keeps concentrations positive.
-BELOW_ZERO = {1: 0.0, 2: UNRESOLVED}
 #: Bounds on the ratio of successive steps.
 LONGER = 2.0
 SHORTER = 0.2
@@ -365,7 +361,7 @@ def _tried(system: System, level: Level, step: float,
 
 def _lowest(problem: Problem) -> np.ndarray:
     """(s, 1) least accepted concentrations, mg/L."""
-    return np.array([[-BELOW_ZERO[problem.space.order] * s.supply] for s in problem.both])
+    return np.array([[-problem.scheme.undershoot * s.supply] for s in problem.both])
 
 
 def _factor(tolerance: float, size: float) -> float:

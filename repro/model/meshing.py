@@ -41,9 +41,7 @@ BOUNDARY_LAYER = 0.15
 #: Largest refinement for layers. A finer mesh has more nodes, the square of this, than the 32-bit
 #: indices of sparse matrices can count.
 FINEST_LAYERS = 2.0**15.5
-#: {order of the elements: divisor}. The edges at the tips of an outline have the length W /
-#: (divisor refinement^2) (W / 200 in the presets paper and fast), but at least W / MOST_AT_TIPS.
-AT_TIPS = {1: 200.0, 2: 5000.0}
+#: The edges at the tips of an outline are at least W over this long.
 MOST_AT_TIPS = 20_000.0
 
 
@@ -210,7 +208,7 @@ class Meshing:
 
 def size_at_tips(numerics: Numerics, width: float) -> float:
     """Length (um) of the edges at an outline's tips; width: of the pore, um."""
-    finest = min(AT_TIPS[numerics.scheme.order] * numerics.refinement**2, MOST_AT_TIPS)
+    finest = min(numerics.scheme.edges_at_tips * numerics.refinement**2, MOST_AT_TIPS)
     return width / finest
 
 

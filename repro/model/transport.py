@@ -52,10 +52,6 @@ SATURATED = 0.9
 SWITCH = 0.5
 #: A concentration is not resolved if it is below zero by more than this part of its supply.
 UNRESOLVED = 1e-3
-#: A concentration is not resolved if it is above its supply by more than this part of the supply.
-OVERSHOOT = 0.02
-#: {order of the elements: largest accepted concentration over its supply}.
-HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT}
 #: The uptake is not resolved if its relative difference from a quadrature of a degree higher by
 #: FINER is above APART. Both quadratures use the same concentrations. In base with fronts of half
 #: saturations from 1e-1 to 1e-6 of the supply, the error of the biomass made in 2 h was at most a
@@ -72,8 +68,8 @@ class Problem:
     matrices: for each substrate, (T, k, k) um2/h, without uptake; operator: (sn, sn) of all
     substrates, uncoupled; magnitude: absolute values of its entries; source: (sn,) um2 mg/L/h;
     inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of all substrates,
-    coupled in biomass; law: None without biomass; modified_newton: does Newton's method keep its
-    derivative as long as the defect decreases fast enough?
+    coupled in biomass; law: None without biomass; scheme: its limits of the concentrations and its
+    Newton's method.
     """
 
     space: Space
@@ -86,7 +82,7 @@ class Problem:
     system: ElementSystem
     substrates: Substrates
     law: RateLaw | None
-    modified_newton: bool
+    scheme: Scheme
 
     @property
     def mesh(self) -> Mesh:
@@ -157,7 +153,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     kinetics : Kinetics, optional
         None without biomass.
     scheme : Scheme
-        Determines inlet, carrier and Newton's method.
+        Determines inlet, carrier, the limits of the concentrations and Newton's method.
 
     Returns
     -------
@@ -177,7 +173,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     sources = np.concatenate([kind.supply * source for kind in kinds])
     law = None if kinetics is None else rate_law(substrates, kinetics).on(space, substrates)
     return Problem(space, matrices, operator, magnitude, sources, inflow, outflow, system,
-                   substrates, law, scheme.modified_newton)
+                   substrates, law, scheme)
 
 
 def diffusion(space: Space, kind: Substrate) -> np.ndarray:
@@ -573,7 +569,7 @@ def steady(problem: Problem, sink: Sink | None,
         If the method does not converge.
     Unresolved
         If the mesh is too coarse for a front: a concentration is below zero by more than UNRESOLVED
-        of the supply, or above the supply by more than OVERSHOOT of the supply, or the uptake
+        of the supply, or above the supply by more than the scheme accepts, or the uptake
         depends on the quadrature.
 
     Notes
@@ -602,7 +598,7 @@ def steady(problem: Problem, sink: Sink | None,
 @failing_as(TransportError)
 def _newton(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     """(sn,) mg/L, the solution by Newton's method from ``state``, and the number of iterations."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.modified_newton)
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.scheme.modified_newton)
     try:
         last, count, converged = newton.solve(balance, balance.begun(state))
     except LinearError:
@@ -624,10 +620,11 @@ def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.n
     law = problem.rate_law
     supply = np.array([s.supply for s in problem.both])[:, None, None]
     sharpest = law.both.sharpness(supply).min()
+    full_newton = replace(problem.scheme, modified_newton=False)
     total = 0
     for factor in 10.0 ** np.arange(np.ceil(-np.log10(sharpest)), -1, -1):
         softened = replace(law, both=law.both.softened(factor, supply))
-        eased = replace(problem, law=softened, modified_newton=False)
+        eased = replace(problem, law=softened, scheme=full_newton)
         state, iterations = _newton(Balance(eased, sink), state)
         total += iterations
     return state, total
@@ -639,7 +636,8 @@ def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrat
     for field, (name, substrate) in zip(fields, problem.substrates.modelled.items()):
         if field.min() < -UNRESOLVED * substrate.supply:
             raise _outside(problem, name, field, int(field.argmin()), substrate)
-        if field.max() / HIGHEST[problem.space.order] > substrate.supply:
+        overshoot = problem.scheme.overshoot
+        if overshoot is not None and field.max() / (1 + overshoot) > substrate.supply:
             raise _outside(problem, name, field, int(field.argmax()), substrate)
     return concentrations(problem.substrates, fields, iterations)
 

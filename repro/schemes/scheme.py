@@ -30,7 +30,17 @@ class Scheme:
         They determine the spaces of velocity and pressure (:mod:`repro.model.flow`), the
         integration of uptake and growth (:mod:`repro.fem.space`), the stabilisation of growth
         (:mod:`repro.model.growth`) and the rule by which films close
-        (:data:`repro.model.contact.CLOSINGS`).
+        (:data:`repro.model.contact.CLOSINGS`). Another scheme with these elements has their values
+        of the next four choices and of ``transfer``.
+    follows_layers : bool
+        Are elements refined at boundary layers and fronts?
+    edges_at_tips : float
+        W over the length of the edges at the tips of an outline, at refinement 1. The length is
+        proportional to refinement^-2.
+    undershoot : float
+        Largest accepted concentration below zero in a step of Gear's method, over the supply.
+    overshoot : float or None
+        Largest accepted concentration above the supply, over the supply; None for no limit.
     steps : {"updates", "midpoint"}
         Shape updates every ``growth.time_step`` (section 2), or the midpoint rule with error
         control (:mod:`repro.march`).
@@ -61,6 +71,10 @@ class Scheme:
     """
 
     elements: str
+    follows_layers: bool
+    edges_at_tips: float
+    undershoot: float
+    overshoot: float | None
     steps: str
     transfer: str
     modified_newton: bool
@@ -77,12 +91,6 @@ class Scheme:
     def order(self) -> int:
         """1: linear functions on straight triangles; 2: quadratic ones on curved triangles."""
         return WORDS["elements"].index(self.elements) + 1
-
-    @property
-    def follows_layers(self) -> bool:
-        """Are elements refined at boundary layers and fronts? The paper's linear elements are not.
-        """
-        return self.order > 1
 
     @property
     def controls_error(self) -> bool:
