@@ -217,7 +217,7 @@ class Topology(Connections):
 
     @property
     def edges(self) -> np.ndarray:
-        """(E, 2) corners at the ends of every edge."""
+        """(E, 2) corners at the ends of every edge, in ascending order."""
         return self._edges[0]
 
     @property
@@ -225,18 +225,11 @@ class Topology(Connections):
         """(T, 3) numbers of the edges 01, 12 and 20 of each triangle."""
         return self._edges[1]
 
-    @cached_property
-    def _edge_keys(self) -> tuple[np.ndarray, np.ndarray]:
-        ends = np.sort(self.edges, axis=1)
-        keys = ends[:, 0] * self.corners + ends[:, 1]
-        ascending = np.argsort(keys)
-        return keys[ascending], ascending
-
     def edge_numbers(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(K,) numbers of the edges between the corners ``first`` (K,) and ``second`` (K,)."""
-        keys, ascending = self._edge_keys
-        edge_keys = np.minimum(first, second) * self.corners + np.maximum(first, second)
-        return ascending[np.searchsorted(keys, edge_keys)]
+        keys = self.edges @ (self.corners, 1)
+        return np.searchsorted(
+            keys, np.minimum(first, second) * self.corners + np.maximum(first, second))
 
     @cached_property
     def dofs(self) -> Dofs:

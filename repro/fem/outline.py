@@ -183,11 +183,8 @@ class Outline:
 
     @cached_property
     def _extreme_points(self) -> np.ndarray:
-        """(K, 2) um, points that include the extremes of x and of y."""
-        return np.concatenate([self._peaks(), self.points])
-
-    def _peaks(self) -> np.ndarray:
-        """(K, 2) um, points within an arc at which x or y is stationary.
+        """(K, 2) um, points that include the extremes of x and of y: the nodes, and the points
+        within an arc at which x or y is stationary.
 
         With t from -1 to 1, an arc is m + t (b - a) / 2 + t^2 (a - 2 m + b) / 2.
         """
@@ -196,7 +193,8 @@ class Outline:
         bend = a - 2 * m + b
         arc, axis = np.nonzero(np.abs(along) < 2 * np.abs(bend))
         t = (-0.5 * along[arc, axis] / bend[arc, axis])[:, None]
-        return m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
+        peaks = m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
+        return np.concatenate([peaks, self.points])
 
 
 def polygon_area(points: np.ndarray) -> float:

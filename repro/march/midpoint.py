@@ -260,18 +260,14 @@ def _match_production(previous: Pore, after: Pore,
 
 
 def _guess_substrates(start: Solved, half: Halfway, part: float) -> Concentrations:
-    """Initial guess of the substrates at a fraction of the step."""
-    first = start.substrates.concentrations
-    return _extrapolate_substrates(first, half.solved.substrates.concentrations, part)
+    """Initial guess of the substrates at a fraction ``part`` of the step.
 
-
-def _extrapolate_substrates(first: Concentrations, second: Concentrations,
-                            part: float) -> Concentrations:
-    """Extrapolate concentrations from the start and half way to a fraction ``part`` of the step.
-
-    The result is ``second``, the solution half way, if the extrapolation is negative anywhere. It
-    is ``first``, the solution at the start, if the mesh has changed half way.
+    Concentrations are extrapolated from the start and half way. The guess is the solution half way
+    if the extrapolation is negative anywhere, and the solution at the start if the mesh has changed
+    half way.
     """
+    first = start.substrates.concentrations
+    second = half.solved.substrates.concentrations
     if second.fields.shape != first.fields.shape:
         return first
     fields = first.fields + 2 * part * (second.fields - first.fields)

@@ -128,7 +128,8 @@ class Linear:
         """The flow of a velocity and a pressure, with the loss (6)."""
         mesh = self.velocity.mesh
         slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
-        return UnitFlow(u, pressure, self.tau[:, None] * slope, _drop(self.velocity, pressure))
+        loss = self.velocity.inlet.mean(pressure) - self.velocity.outlet.mean(pressure)
+        return UnitFlow(u, pressure, self.tau[:, None] * slope, loss)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,11 +262,6 @@ def work(load: np.ndarray, solution: np.ndarray, width: float) -> float:
     (2n + m,), of the system.
     """
     return float(load @ solution) / width
-
-
-def _drop(space: Space, pressure: np.ndarray) -> float:
-    """Mean pressure at the inlet minus mean pressure at the outlet (6)."""
-    return space.inlet.mean(pressure) - space.outlet.mean(pressure)
 
 
 def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
