@@ -84,7 +84,7 @@ def test_substrates_whose_uptake_overflows_fail_in_transport(law, substrates):
     """Biomass that grows over 1e5 h, and concentrations of an iterate that diverges. Uptake of zero order is
     bounded."""
     pore, problem = stirred(law, substrates)
-    huge = transport.supplied_everywhere(problem).with_fields(np.full((len(problem.both), pore.space.count), HUGE))
+    huge = transport.supplied_everywhere(problem).with_fields(np.full((len(problem.kinds), pore.space.count), HUGE))
     with pytest.raises(TransportError, match=OUT_OF_DOMAIN):
         transport.steady(problem, Sink(pore.active, 1e5))
     with pytest.raises(TransportError, match=OUT_OF_DOMAIN):

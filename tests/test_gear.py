@@ -131,7 +131,7 @@ def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
     x = np.abs(space.points[:, 0])
     far = x >= 95
     assert first.pore.mesh.ends == pytest.approx((-300, 300)) and far.sum() > 20
-    for field, flux, kind in zip((state.acceptor, state.donor), first.solved.fluxes, first.solved.problem.both):
+    for field, flux, kind in zip((state.acceptor, state.donor), first.solved.fluxes, first.solved.problem.kinds):
         fall = flux.consumed / 2 / (kind.diffusivity * scene.pore.width)
         assert field[far] == pytest.approx(kind.supply - fall * (300 - x[far]), abs=np.exp(-1.5 * np.pi))
         assert fall * 200 > 1

@@ -318,7 +318,7 @@ def test_an_update_under_a_table_starts_from_gears_concentrations(order):
     scene, pore = coarse_base(order, "numerics.transport=gear", f"substrates.acceptor.supply={supply}")
     solved = solve(scene, pore)
     half_way = updates._solve_midway(Stages.of(scene), pore, solved, 0.2)
-    assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)
+    assert half_way.concentrations is solved.concentrations and half_way.problem.kinds[0].supply == pytest.approx(11.0)
     stored = updates.step(Stages.of(scene), pore, solved, 0.2).ledger.stored[0]
     risen = stored / (scene.pore.width * np.ptp(pore.mesh.ends))
     assert risen == pytest.approx(2.0, rel=0.05)
