@@ -73,6 +73,10 @@ class Element:
         after = np.roll(values, -1, axis=0)
         return np.stack([values, 0.5 * (values + after), after], axis=1)
 
+    def on_edge(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(..., parts + 1) shape functions of an edge's nodes at s in [0, 1], and derivatives."""
+        return np.stack([1 - s, s], axis=-1), np.stack([0 * s - 1, 0 * s + 1], axis=-1)
+
     def local(self, nodes: np.ndarray, where: np.ndarray) -> np.ndarray:
         """(K, 2) coordinates on the unit triangle of points (K, 2) um in triangles (K, k, 2) um."""
         return barycentric(nodes, where)[:, 1:]
@@ -102,6 +106,10 @@ class Curved(Element):
         """See :meth:`Element.arcs`."""
         ends = np.concatenate([values[2::2], values[:1]])
         return np.stack([values[::2], values[1::2], ends], axis=1)
+
+    def on_edge(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :meth:`Element.on_edge`."""
+        return parabola(s), np.stack([4 * s - 3, 4 - 8 * s, 4 * s - 1], axis=-1)
 
     def local(self, nodes: np.ndarray, where: np.ndarray) -> np.ndarray:
         """See :meth:`Element.local`. Newton's method inverts x(s, t). Where it does not converge,
@@ -269,6 +277,11 @@ def side_table(order: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     direction = corners[NEXT[side]] - corners[side]
     where = corners[side] + s[:, None] * direction
     return values(order, where), weights, derivatives(order, where) @ direction
+
+
+def parabola(t: np.ndarray) -> np.ndarray:
+    """(..., 3) shape functions of start, middle and end of an arc at t in [0, 1]."""
+    return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
 
 
 def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:

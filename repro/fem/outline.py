@@ -16,7 +16,7 @@ import shapely
 
 from repro.errors import OutsidePore
 from repro.fem.brief import brief
-from repro.fem.elements import ELEMENTS, Element
+from repro.fem.elements import ELEMENTS, Element, parabola
 from repro.fem.walls import (
     FREE,
     Seat,
@@ -141,8 +141,8 @@ class Outline:
 
     def edges_on(self, wall: int) -> np.ndarray:
         """(e, 2 or 3) numbers of the nodes of each edge on a wall, along the loop."""
-        edges = self.arcs(np.arange(len(self.points)))[self.edge_wall == wall]
-        return edges[:, :: 3 - self.geometry].astype(int)
+        start = self.geometry * np.flatnonzero(self.edge_wall == wall)
+        return (start[:, None] + np.arange(self.geometry + 1)) % len(self.points)
 
     def contact_length(self, wall: Wall) -> float:
         """Length (um) of the contact surface with a wall."""
@@ -218,18 +218,6 @@ def _lenses(arcs: np.ndarray) -> float:
     bow = m - 0.5 * (a + b)
     lens = bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]
     return float(2 / 3 * np.sum(lens))
-
-
-def parabola(t: np.ndarray) -> np.ndarray:
-    """(..., 3) shape functions of start, middle and end of an arc at t in [0, 1]."""
-    return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
-
-
-def edge_functions(count: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(..., count) shape functions of an edge's 2 or 3 nodes at s in [0, 1], and derivatives."""
-    if count == 2:
-        return np.stack([1 - s, s], axis=-1), np.stack([0 * s - 1, 0 * s + 1], axis=-1)
-    return parabola(s), np.stack([4 * s - 3, 4 - 8 * s, 4 * s - 1], axis=-1)
 
 
 def arc_derivatives(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
