@@ -113,10 +113,10 @@ def run(monkeypatch, *changes, unset=()):
     """[[length, error or None]] of the attempted steps of a run to 0.6 h, and the time of its last row."""
     attempts, attempt = [], midpoint.attempt
 
-    def record(stages, previous, solved, duration, *options):
+    def record(stages, previous, solved, duration, *options, **named):
         attempts.append([duration, None])
         try:
-            return attempt(stages, previous, solved, duration, *options)
+            return attempt(stages, previous, solved, duration, *options, **named)
         except Exception as error:
             attempts[-1][1] = error
             raise
@@ -131,9 +131,9 @@ def leave_domain(monkeypatch, owner, name, shortest=0.0):
     """Let a function of a stage leave its domain in each attempted step longer than ``shortest`` (h)."""
     function, attempt, lengths = getattr(owner, name), midpoint.attempt, [0.0]
 
-    def start(stages, previous, solved, duration, *options):
+    def start(stages, previous, solved, duration, *options, **named):
         lengths.append(duration)
-        return attempt(stages, previous, solved, duration, *options)
+        return attempt(stages, previous, solved, duration, *options, **named)
 
     def fail(*arguments, **options):
         if lengths[-1] > shortest:
