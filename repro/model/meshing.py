@@ -30,8 +30,6 @@ from repro.scene import Aggregate, Growth, Numerics, Scene, Substrates, at_large
 from repro.scene import Flow as Drive
 from repro.scene import Pore as Channel
 
-#: Thinnest film to resolve (um, Table 1) in a scene without growth.minimum_film.
-MINIMUM_FILM = 2.0
 #: The largest refinement that scenes accept.
 MOST_REFINED = 20.0
 #: Refinement of quadratic elements over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3)
@@ -63,8 +61,10 @@ def whole_width_of(scene: Scene) -> float:
 
 def film(scene: Scene) -> float:
     """Thickness (um) below which a film closes. It is also the thinnest film that a mesh resolves.
+
+    Without growth it is the default of growth.minimum_film.
     """
-    return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
+    return (scene.growth or Growth(end=0.0)).minimum_film
 
 
 def least_gap(scene: Scene) -> float:
