@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from paper_figures import figure_6, runs, states, style
 from verification.claims import discussed
 from verification.claims.discussed import LAYERS
-from verification.claims.permeability import clean, layered_share
+from verification.claims.permeability import clean_per_day, layered_share
 
 TITLE = "Addition. The same biomass as an aggregate and as layers"
 RUNS = (runs.WIDE_CONVERGED,)
@@ -42,7 +42,7 @@ def draw(folder: Path) -> Figure:
 
 def _conductivity(axes: Axes, folder: Path) -> None:
     scene, table = runs.WIDE.load(), states.series(folder)
-    axes.plot(filled(table), table["conductivity_m_per_d"] / (24e-6 * clean(scene)), color=style.RED, label="aggregate")
+    axes.plot(filled(table), table["conductivity_m_per_d"] / clean_per_day(scene), color=style.RED, label="aggregate")
     for walls, (label, linestyle) in WALLS.items():
         shares = [layered_share(scene.flow.viscosity_ratio, float(part), walls) for part in CONDUCTIVITY_SHARES]
         axes.plot(CONDUCTIVITY_SHARES, shares, linestyle, color=style.BLUE, label=label)

@@ -13,6 +13,7 @@ from repro.model.kinetics import Sink
 from repro.model.resistance import Viscous
 from repro.results.files import sealed
 from repro.scene import load_scene, scene_hash
+from repro.schemes import CURVED
 from tests.strategies import meshed, seed
 from verification import store
 from verification.sensitivity import rounding
@@ -111,7 +112,7 @@ def concentrations(boundary, flowing, mesh):
     space = Space(mesh)
     carried = flow.solve(space, WIDE.flow, 600.0) if flowing else None
     substrates = replace(BASE.substrates, boundary=boundary)
-    problem = transport.problem(space, carried, substrates, BASE.kinetics)
+    problem = transport.problem(space, carried, substrates, BASE.kinetics, CURVED)
     sink = Sink(1e-3 * BASE.kinetics.maximum_density * space.reaction.dx)
     if boundary == "closed":
         start = transport.supplied_everywhere(problem)

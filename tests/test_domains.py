@@ -70,7 +70,7 @@ def stirred(law, substrates):
     scene = load_scene("base", [*FAST, f"kinetics.law={law}"], unset=unset)
     pore = seeded(scene)
     carried = Solver.of(scene).solve_flow(pore.space, scene.flow)
-    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
+    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics, scene.numerics.scheme)
 
 
 LAWS_AND_SUBSTRATES = pytest.mark.parametrize("law, substrates", [
@@ -84,7 +84,7 @@ def test_substrates_whose_uptake_overflows_fail_in_transport(law, substrates):
     """Biomass that grows over 1e5 h, and concentrations of an iterate that diverges. Uptake of zero order is
     bounded."""
     pore, problem = stirred(law, substrates)
-    huge = transport.supplied_everywhere(problem).with_fields(np.full((len(problem.both), pore.space.count), HUGE))
+    huge = transport.supplied_everywhere(problem).with_fields(np.full((len(problem.kinds), pore.space.count), HUGE))
     with pytest.raises(TransportError, match=OUT_OF_DOMAIN):
         transport.steady(problem, Sink(pore.active, 1e5))
     with pytest.raises(TransportError, match=OUT_OF_DOMAIN):
@@ -113,10 +113,10 @@ def run(monkeypatch, *changes, unset=()):
     """[[length, error or None]] of the attempted steps of a run to 0.6 h, and the time of its last row."""
     attempts, attempt = [], midpoint.attempt
 
-    def record(stages, previous, solved, duration, *options):
+    def record(stages, previous, solved, duration, *options, **named):
         attempts.append([duration, None])
         try:
-            return attempt(stages, previous, solved, duration, *options)
+            return attempt(stages, previous, solved, duration, *options, **named)
         except Exception as error:
             attempts[-1][1] = error
             raise
@@ -131,9 +131,9 @@ def leave_domain(monkeypatch, owner, name, shortest=0.0):
     """Let a function of a stage leave its domain in each attempted step longer than ``shortest`` (h)."""
     function, attempt, lengths = getattr(owner, name), midpoint.attempt, [0.0]
 
-    def start(stages, previous, solved, duration, *options):
+    def start(stages, previous, solved, duration, *options, **named):
         lengths.append(duration)
-        return attempt(stages, previous, solved, duration, *options)
+        return attempt(stages, previous, solved, duration, *options, **named)
 
     def fail(*arguments, **options):
         if lengths[-1] > shortest:

@@ -33,7 +33,7 @@ def case(radius="20 um", velocity="2.9 m/day", boundary="open", order=1, **secti
                              **{**sections, "substrates": {"acceptor": {}, "donor": {}, **substrates}})
     pore = seeded(scene)
     carried = Solver.of(scene).solve_flow(pore.space, scene.flow) if scene.flow else None
-    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics)
+    return pore, transport.problem(pore.space, carried, scene.substrates, scene.kinetics, scene.numerics.scheme)
 
 
 def storage(problem):
@@ -62,7 +62,7 @@ def supplied(problem, acceptor):
     """Return the same problem with another supply of the acceptor (mg/L)."""
     substrates = problem.substrates
     other = replace(substrates, acceptor=replace(substrates.acceptor, supply=acceptor))
-    return transport.problem(problem.space, None, other, problem.law.constants)
+    return transport.problem(problem.space, None, other, problem.law.constants, problem.scheme)
 
 
 @EVERY_ORDER
@@ -131,7 +131,7 @@ def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
     x = np.abs(space.points[:, 0])
     far = x >= 95
     assert first.pore.mesh.ends == pytest.approx((-300, 300)) and far.sum() > 20
-    for field, flux, kind in zip((state.acceptor, state.donor), first.solved.fluxes, first.solved.problem.both):
+    for field, flux, kind in zip((state.acceptor, state.donor), first.solved.fluxes, first.solved.problem.kinds):
         fall = flux.consumed / 2 / (kind.diffusivity * scene.pore.width)
         assert field[far] == pytest.approx(kind.supply - fall * (300 - x[far]), abs=np.exp(-1.5 * np.pi))
         assert fall * 200 > 1

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from scipy.interpolate import CubicSpline
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay
 
 from repro.errors import MeshError
 from repro.fem import elements
@@ -95,6 +96,26 @@ def test_cornered_triangles_are_freed_in_either_region_for_any_first_node(biomas
     freed = unlocked(grid)
     assert strategies.boundary_edge_counts(freed.triangles) == [1] * 8
     assert triangle_areas(points, freed.triangles) == pytest.approx(np.full(8, 0.5))
+
+
+# ---------------------------------------------------------------- nodes of the ends and of the walls
+
+
+@both
+@pytest.mark.parametrize("across", [1, 3])
+def test_ends_and_walls_have_the_nodes_that_lie_on_them(geometry, across):
+    """Their coordinates give them: those of an end from the lower wall up, each once. If a single edge crosses the
+    pore, its middle is on no wall."""
+    x, y = np.meshgrid(np.linspace(-2.0, 2.0, 4), np.linspace(0.0, 1.0, across + 1))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    triangles = Delaunay(points).simplices[::-1]
+    grid = Mesh.of(points, triangles, np.zeros(len(triangles), bool), (), channel_walls(1.0), (-2.0, 2.0))
+    space = Space(grid if geometry == 1 else curved(grid, None))
+    x, y = space.points.T
+    for end, at in ((space.inlet, -2.0), (space.outlet, 2.0)):
+        nodes = np.flatnonzero(x == at)
+        assert end.nodes.tolist() == nodes[np.argsort(y[nodes])].tolist()
+    assert sorted(space.dofs.walls) == np.flatnonzero((y == 0.0) | (y == 1.0)).tolist()
 
 
 # ---------------------------------------------------------------- splines

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from repro.fem import sizing as of
-from repro.fem.outline import Outline, polygon
+from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.walls import BOTTOM, FREE, TOP, Seat, channel_walls
 from repro.model import meshing
@@ -49,6 +49,27 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
     edges = fine.corners.edge_lengths()[fine.corners.interface_edges()]
     assert edges.max() <= unequal * of.SPLIT * sizes.max() * (1 + 1e-12)
     assert not of.too_coarse(fine.corners, sizing)
+
+
+@EVERY_GEOMETRY
+def test_a_new_node_of_a_seed_has_its_material_on_the_seeds_arc(geometry):
+    """Straight edges stand for arcs of the circle. The parts of an arc stay on it: at t = 0 the new nodes are their own
+    origin, within the sag of the arc from the circle."""
+    seed = half_disc(20.0, 4.0, geometry)
+    fine = of.split(seed, Sizing(channel_walls(50.0), 2.0, FILM))
+    free = fine.wall == FREE
+    assert len(fine.points) > 1.5 * len(seed.points) and (fine.fixed.sum(), fine.points[fine.fixed].tolist()) == (
+        1, [[0.0, 0.0]])
+    on_circle = np.abs(np.hypot(*fine.origin[free].T) - 20.0).max()
+    assert on_circle < 1e-12 if geometry == 1 else (fine.origin == fine.points).all() and on_circle > 1e-6
+
+
+@EVERY_GEOMETRY
+def test_a_drawn_aggregate_has_one_fixed_node_on_each_wall(geometry):
+    """It is a corner in the middle of the contact surface."""
+    drawn = polygon([(-9.0, 0.0), (-3.0, 20.0), (1.0, 20.0), (7.0, 0.0)], channel_walls(20.0), geometry)
+    assert drawn.points[drawn.fixed].tolist() == [[-1.0, 0.0], [-1.0, 20.0]]
+    assert drawn.fixed[::geometry].sum() == 2
 
 
 @given(outlines(width=widths), lengths)

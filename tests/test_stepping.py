@@ -178,9 +178,9 @@ def test_a_step_ends_at_contact_within_a_thousandth_of_the_film(monkeypatch):
     assert 1.998 < 4 - 3 * stepping._part_to_contact(4.0, 1.0, 2.0) < 2
     searches, attempt = [], midpoint.attempt
 
-    def record_search(*arguments):
+    def record_search(*arguments, **named):
         searches.extend(each for each in arguments[5:6] if each is not PATIENT)  # a cut searches patiently
-        return attempt(*arguments)
+        return attempt(*arguments, **named)
 
     monkeypatch.setattr(midpoint, "attempt", record_search)
     scene = base('growth.end="1 h"', 'output.times=["1 h"]')
@@ -195,9 +195,9 @@ def test_a_failure_of_the_shortest_step_stops_the_run(monkeypatch, error, messag
     """The message has the time of the step. growth.time_step / 1000 has failed before."""
     tried, attempt = [], midpoint.attempt
 
-    def fails_later(scene, state, solved, duration, *options):
+    def fails_later(scene, state, solved, duration, *options, **named):
         if state.time == 0:
-            return attempt(scene, state, solved, duration, *options)
+            return attempt(scene, state, solved, duration, *options, **named)
         tried.append(duration)
         raise error
 
@@ -220,10 +220,10 @@ def test_the_last_step_uses_finer_elements_if_a_front_needs_them(needed, message
     """This also holds half way in the step that growth.end cuts. If no elements suffice, the error has advice."""
     attempt = midpoint.attempt
 
-    def cut(scene, state, solved, duration, *most):
+    def cut(scene, state, solved, duration, *most, **named):
         if duration == 0.3 and state.front < needed:
             raise Unresolved("the mesh is too coarse")
-        return attempt(scene, state, solved, duration, *most)
+        return attempt(scene, state, solved, duration, *most, **named)
 
     monkeypatch.setattr(midpoint, "attempt", cut)
     scene = simulation.simulate(base('growth.end="0.3 h"', 'output.times=["0.3 h"]'))
@@ -242,11 +242,11 @@ def test_steps_to_a_row_are_graded_and_shortened_like_every_step(error, monkeypa
     def fail(*_):
         raise error
 
-    def to_the_row(scene, state, solved, duration, *most):
+    def to_the_row(scene, state, solved, duration, *most, **named):
         tried.append((duration, state.front))
         if duration == 0.15 and (isinstance(error, GrowthError) or state.front < 2):
             raise error
-        return attempt(scene, state, solved, duration, *most)
+        return attempt(scene, state, solved, duration, *most, **named)
 
     monkeypatch.setattr(midpoint, "interpolate", fail)
     monkeypatch.setattr(midpoint, "attempt", to_the_row)
@@ -318,7 +318,7 @@ def test_an_update_under_a_table_starts_from_gears_concentrations(order):
     scene, pore = coarse_base(order, "numerics.transport=gear", f"substrates.acceptor.supply={supply}")
     solved = solve(scene, pore)
     half_way = updates._solve_midway(Stages.of(scene), pore, solved, 0.2)
-    assert half_way.concentrations is solved.concentrations and half_way.problem.both[0].supply == pytest.approx(11.0)
+    assert half_way.concentrations is solved.concentrations and half_way.problem.kinds[0].supply == pytest.approx(11.0)
     stored = updates.step(Stages.of(scene), pore, solved, 0.2).ledger.stored[0]
     risen = stored / (scene.pore.width * np.ptp(pore.mesh.ends))
     assert risen == pytest.approx(2.0, rel=0.05)

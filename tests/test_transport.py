@@ -133,7 +133,7 @@ def test_the_inlet_is_weighted_with_the_flow_for_any_inlet_condition(order):
 def test_a_concentration_may_leave_its_bounds_by_the_documented_part(order):
     """It may fall below zero by a thousandth of its supply and, with curved elements, exceed it by a fiftieth."""
     scene, pore = coarse_base(order)
-    problem = transport.problem(pore.space, None, scene.substrates, scene.kinetics)
+    problem = transport.problem(pore.space, None, scene.substrates, scene.kinetics, scene.numerics.scheme)
     for k, (part, accepted) in product((0, 1), ((-9e-4, True), (-1.1e-3, False), (1.019, True), (1.021, order == 1))):
         state = problem.supply
         state[k * problem.space.count + 7] *= part

@@ -18,9 +18,6 @@ from repro.fem.elements import Table
 from repro.fem.mesh import Mesh, Topology
 from repro.fem.outline import parabola
 
-#: Corners of the unit triangle.
-CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-
 
 @dataclass(frozen=True)
 class DividedTriangle:
@@ -40,7 +37,7 @@ class DividedTriangle:
     @property
     def corners(self) -> np.ndarray:
         """(3, 2) start and end of the edge and the opposite corner, on the unit triangle."""
-        return CORNERS[self.rotation]
+        return elements.nodes(1)[self.rotation]
 
     @property
     def rotation(self) -> np.ndarray:

@@ -8,48 +8,172 @@ grad N = N_,st (x_,st)^-1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from skfem import ElementTriP1, ElementTriP2
 from skfem.element import ElementH1
 from skfem.quadrature import get_quadrature_line, get_quadrature_tri
 
+if TYPE_CHECKING:
+    from repro.fem.mesh import Mesh, Topology
+    from repro.fem.space import Lumped, Quadrature, Space
+
 #: The corner at the other end of the edges 01, 12 and 20.
 NEXT = [1, 2, 0]
+#: Number of straight lines that replace an arc to compute distances. They err by up to 1/256 of the
+#: arc's sag.
+ON_ARC = 16
+#: Largest number of Newton steps that locate a point in a curved triangle.
+NEWTON_STEPS = 12
+#: Newton's method stops after a step shorter than this on the unit triangle. The error is then of
+#: the order of its square.
+CLOSE = 1e-8
 
 
 @dataclass(frozen=True)
 class Element:
-    """The functions of an order, and the quadrature that they need.
+    """Linear functions on straight triangles, whose nodes are the corners.
 
     degree: of the quadrature on triangles and edges, for products of two functions and a nearly
     linear coefficient; gradient_degree: of the quadrature for products of gradients, lower for
-    linear functions because their gradients are constant; on_edge: indices of the triangle's
-    functions that belong to edge 01; edge_weights: weights of this edge's nodes in the
-    Newton-Cotes rule.
+    linear functions because their gradients are constant; sides: nodes of the edges 01, 12 and 20;
+    edge_weights: weights of an edge's nodes in the Newton-Cotes rule; lines: number of straight
+    lines that replace an edge to compute distances.
     """
 
     functions: ElementH1
     degree: int
     gradient_degree: int
-    on_edge: tuple[int, ...]
+    sides: tuple[tuple[int, ...], ...]
     edge_weights: tuple[float, ...]
+    lines: int
+
+    @property
+    def parts(self) -> int:
+        """Number of parts into which its nodes divide an edge."""
+        return len(self.sides[0]) - 1
+
+    def along(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """(K, parts, ...) nodes of straight edges from ``start`` (K, ...) to ``end`` (K, ...),
+        without the last node of each edge."""
+        shares = np.arange(self.parts) / self.parts
+        return np.stack([(1 - share) * start + share * end for share in shares], axis=1)
+
+    def middles(self, corners: np.ndarray) -> np.ndarray:
+        """(T, k - 3, ...) values at the nodes inside edges of a field that is linear on edges, from
+        values (T, 3, ...) at the corners."""
+        return corners[:, :0]
+
+    def arcs(self, values: np.ndarray) -> np.ndarray:
+        """(edges, 3, ...) of values (M, ...) at the nodes of a loop, at the start, middle and end
+        of each edge."""
+        after = np.roll(values, -1, axis=0)
+        return np.stack([values, 0.5 * (values + after), after], axis=1)
+
+    def on_edge(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(..., parts + 1) shape functions of an edge's nodes at s in [0, 1], and derivatives."""
+        return np.stack([1 - s, s], axis=-1), np.stack([0 * s - 1, 0 * s + 1], axis=-1)
+
+    def local(self, nodes: np.ndarray, where: np.ndarray) -> np.ndarray:
+        """(K, 2) coordinates on the unit triangle of points (K, 2) um in triangles (K, k, 2) um."""
+        return barycentric(nodes, where)[:, 1:]
+
+    def straightened(self, topology: Topology) -> Topology:
+        """The topology of the straight triangles between the corners."""
+        return topology
+
+    def with_nodes(self, straight: Mesh) -> Mesh:
+        """The mesh of straight triangles, with the nodes of this element."""
+        return straight
+
+    def integration(self, space: Space) -> Lumped | Quadrature:
+        """The rule of a space that integrates the reaction."""
+        return space.at_nodes
+
+
+class Curved(Element):
+    """Quadratic functions on curved triangles, whose nodes are the corners, then the middles of the
+    edges 01, 12 and 20."""
+
+    def middles(self, corners: np.ndarray) -> np.ndarray:
+        """See :meth:`Element.middles`."""
+        return 0.5 * (corners + corners[:, NEXT])
+
+    def arcs(self, values: np.ndarray) -> np.ndarray:
+        """See :meth:`Element.arcs`."""
+        ends = np.concatenate([values[2::2], values[:1]])
+        return np.stack([values[::2], values[1::2], ends], axis=1)
+
+    def on_edge(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See :meth:`Element.on_edge`."""
+        return parabola(s), np.stack([4 * s - 3, 4 - 8 * s, 4 * s - 1], axis=-1)
+
+    def local(self, nodes: np.ndarray, where: np.ndarray) -> np.ndarray:
+        """See :meth:`Element.local`. Newton's method inverts x(s, t). Where it does not converge,
+        the result is far outside the unit triangle."""
+        local = np.clip(barycentric(nodes[:, :3], where)[:, 1:], -2.0, 3.0)
+        rest = np.arange(len(where))
+        for _ in range(NEWTON_STEPS):
+            guess = local[rest]
+            corners = nodes[rest]
+            values, gradients = evaluated(2, guess)
+            offset = (values[:, None] @ corners)[:, 0] - where[rest]
+            J = np.swapaxes(corners, 1, 2) @ gradients
+            det = determinant(J)
+            det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
+            ds = J[:, 1, 1] * offset[:, 0] - J[:, 0, 1] * offset[:, 1]
+            dt = J[:, 0, 0] * offset[:, 1] - J[:, 1, 0] * offset[:, 0]
+            step = np.stack([ds, dt], axis=1) / det[:, None]
+            local[rest] = np.clip(guess - step, -2.0, 3.0)
+            rest = rest[np.abs(step).max(axis=1) >= CLOSE]
+            if len(rest) == 0:
+                break
+        offset = np.einsum("ka,kai->ki", evaluated(2, local)[0], nodes) - where
+        lost = np.hypot(*offset.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
+        return np.where(lost[:, None], 99.0, local)
+
+    def straightened(self, topology: Topology) -> Topology:
+        """See :meth:`Element.straightened`."""
+        return replace(topology, cells=np.ascontiguousarray(topology.triangles),
+                       loops=tuple(loop[::2].copy() for loop in topology.loops))
+
+    def with_nodes(self, straight: Mesh) -> Mesh:
+        """See :meth:`Element.with_nodes`. The middle of edge i is node ``corners`` + i."""
+        topology = straight.topology
+        count = straight.corners
+        points = np.vstack([straight.points, straight.points[topology.edges].mean(axis=1)])
+        cells = np.column_stack([topology.triangles, count + topology.cell_edges])
+        loops = tuple(np.column_stack([loop, count + topology.edge_numbers(
+            loop, np.roll(loop, -1))]).ravel() for loop in topology.loops)
+        return replace(straight, points=points,
+                       topology=replace(topology, cells=cells, loops=loops))
+
+    def integration(self, space: Space) -> Quadrature:
+        """Integration at the quadrature points."""
+        return space.at_points
 
 
 #: {order: linear element on straight triangles, or quadratic element on curved triangles}.
-ELEMENTS = {
-    1: Element(ElementTriP1(), degree=2, gradient_degree=1, on_edge=(0, 1),
-               edge_weights=(1 / 2, 1 / 2)),
-    2: Element(ElementTriP2(), degree=6, gradient_degree=6, on_edge=(0, 3, 1),
-               edge_weights=(1 / 6, 4 / 6, 1 / 6)),
+ELEMENTS: dict[int, Element] = {
+    1: Element(ElementTriP1(), degree=2, gradient_degree=1, sides=((0, 1), (1, 2), (2, 0)),
+               edge_weights=(1 / 2, 1 / 2), lines=1),
+    2: Curved(ElementTriP2(), degree=6, gradient_degree=6,
+              sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), edge_weights=(1 / 6, 4 / 6, 1 / 6),
+              lines=ON_ARC),
 }
 
 
 def order_of(cells: np.ndarray) -> int:
-    """Order of elements with nodes (T, 3 or 6)."""
-    return 1 if cells.shape[1] == 3 else 2
+    """Order of elements with nodes (T, 3 or 6): each edge has one node more than its order."""
+    return cells.shape[1] // 3
+
+
+def element_of(cells: np.ndarray) -> Element:
+    """The element with nodes (T, 3 or 6)."""
+    return ELEMENTS[order_of(cells)]
 
 
 def nodes(order: int) -> np.ndarray:
@@ -139,7 +263,7 @@ def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
     element = ELEMENTS[order]
     (s,), weights = get_quadrature_line(element.degree)
     along = values(order, np.column_stack([s, 0 * s]))
-    return along[:, element.on_edge], weights
+    return along[:, element.sides[0]], weights
 
 
 @cache
@@ -153,6 +277,23 @@ def side_table(order: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     direction = corners[NEXT[side]] - corners[side]
     where = corners[side] + s[:, None] * direction
     return values(order, where), weights, derivatives(order, where) @ direction
+
+
+def parabola(t: np.ndarray) -> np.ndarray:
+    """(..., 3) shape functions of start, middle and end of an arc at t in [0, 1]."""
+    return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
+
+
+def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(..., 3) barycentric coordinates of points (..., 2) in triangles (..., 3, 2)."""
+    a, b, c = (corners[..., i, :] for i in range(3))
+
+    def cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+    double = cross(b - a, c - a)
+    a, b, c = (corner - where for corner in (a, b, c))
+    return np.stack([cross(b, c), cross(c, a), cross(a, b)], -1) / double[..., None]
 
 
 def by_component(tensor: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ from repro.errors import MeshError
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem
 from repro.fem.brief import brief
+from repro.fem.elements import Element
 from repro.fem.linear import DEFAULT, Method, node_order
 from repro.fem.walls import Wall, Walls, on_any, whole_width, width_between
 
@@ -135,6 +136,11 @@ class Connections:
         return elements.order_of(self.cells)
 
     @property
+    def element(self) -> Element:
+        """Their nodes and functions."""
+        return elements.element_of(self.cells)
+
+    @property
     def triangles(self) -> np.ndarray:
         """(T, 3) corners."""
         return self.cells[:, :3]
@@ -160,10 +166,7 @@ class Topology(Connections):
     @cached_property
     def straight(self) -> Topology:
         """Topology of the straight triangles between the corners."""
-        if self.geometry == 1:
-            return self
-        return replace(self, cells=np.ascontiguousarray(self.triangles),
-                       loops=tuple(loop[::2].copy() for loop in self.loops))
+        return self.element.straightened(self)
 
     @cached_property
     def biomass(self) -> np.ndarray:
@@ -208,19 +211,13 @@ class Topology(Connections):
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray]:
         ends = np.stack([self.triangles, self.triangles[:, elements.NEXT]], axis=2)
-        if self.geometry == 1:
-            pairs = np.sort(ends.reshape(-1, 2), axis=1)
-            edges, numbers = np.unique(pairs, axis=0, return_inverse=True)
-            return edges, numbers.reshape(-1, 3)
-        numbers = self.cells[:, 3:] - self.corners
-        edges = np.empty((numbers.max(initial=-1) + 1, 2), int)
-        edges[numbers] = ends
-        return edges, numbers
+        pairs = np.sort(ends.reshape(-1, 2), axis=1)
+        edges, numbers = np.unique(pairs, axis=0, return_inverse=True)
+        return edges, numbers.reshape(-1, 3)
 
     @property
     def edges(self) -> np.ndarray:
-        """(E, 2) corners at the ends of every edge. On curved triangles the middle of edge i is
-        node ``corners`` + i."""
+        """(E, 2) corners at the ends of every edge, in ascending order."""
         return self._edges[0]
 
     @property
@@ -228,68 +225,55 @@ class Topology(Connections):
         """(T, 3) numbers of the edges 01, 12 and 20 of each triangle."""
         return self._edges[1]
 
-    @cached_property
-    def _edge_keys(self) -> tuple[np.ndarray, np.ndarray]:
-        ends = np.sort(self.edges, axis=1)
-        keys = ends[:, 0] * self.corners + ends[:, 1]
-        ascending = np.argsort(keys)
-        return keys[ascending], ascending
-
     def edge_numbers(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(K,) numbers of the edges between the corners ``first`` (K,) and ``second`` (K,)."""
-        keys, ascending = self._edge_keys
-        edge_keys = np.minimum(first, second) * self.corners + np.maximum(first, second)
-        return ascending[np.searchsorted(keys, edge_keys)]
+        keys = self.edges @ (self.corners, 1)
+        return np.searchsorted(
+            keys, np.minimum(first, second) * self.corners + np.maximum(first, second))
 
     @cached_property
     def dofs(self) -> Dofs:
         """Nodes of the ends and of the walls."""
-        return _corners(self) if self.geometry == 1 else _corners_and_middles(self)
+        walls = np.concatenate([self.walls, self._inside_edges_on_walls()])
+        return Dofs(self.cells, int(self.cells.max()) + 1, self._edges_of(self.inlet),
+                    self._edges_of(self.outlet), walls)
+
+    @cached_property
+    def _sides(self) -> np.ndarray:
+        """(T, 3, e) nodes of the edges 01, 12 and 20 of each triangle."""
+        return self.cells[:, np.array(self.element.sides)]
+
+    def _joins(self, corners: np.ndarray) -> np.ndarray:
+        """(T, 3) True where an edge joins two of some corners."""
+        chosen = np.zeros(self.corners, bool)
+        chosen[corners] = True
+        return chosen[self._sides[:, :, [0, -1]]].all(axis=2)
+
+    def _edges_of(self, line: np.ndarray) -> np.ndarray:
+        """(E, e) nodes of the edges of a line of corners, in its order and direction."""
+        edges = self._sides[self._joins(line)]
+        place = np.empty(self.corners, int)
+        place[line] = np.arange(len(line))
+        start = place[edges[:, 0]]
+        end = place[edges[:, -1]]
+        forward = np.where((start < end)[:, None], edges, edges[:, ::-1])
+        return forward[np.argsort(np.minimum(start, end))]
+
+    def _inside_edges_on_walls(self) -> np.ndarray:
+        """Nodes inside the edges that have one triangle and both corners on a wall, ascending.
+
+        If the inlet or the outlet is a single edge, this edge joins both walls and does not count.
+        """
+        inside = self._sides[:, :, 1:-1]
+        across = self._joins(self.inlet) | self._joins(self.outlet)
+        nodes = np.sort(inside[self._joins(self.walls) & ~across].ravel())
+        return nodes[np.bincount(inside.ravel(), minlength=1 + nodes.max(initial=0))[nodes] == 1]
 
     def system(self, key: Hashable, make: Callable[[], ElementSystem]) -> ElementSystem:
         """The sparse system of a key on these connections; ``make`` builds it on first use."""
         if key not in self._systems:
             self._systems[key] = make()
         return self._systems[key]
-
-
-def _corners(topology: Topology) -> Dofs:
-    """The nodes of straight triangles."""
-    inlet, outlet = (np.column_stack([line[:-1], line[1:]])
-                     for line in (topology.inlet, topology.outlet))
-    return Dofs(topology.cells, topology.corners, inlet, outlet, topology.walls)
-
-
-def _corners_and_middles(topology: Topology) -> Dofs:
-    """The nodes of curved triangles: corners, then the middle of every edge."""
-    inlet, outlet = (_with_middles(topology, line) for line in (topology.inlet, topology.outlet))
-    walls = np.concatenate([topology.walls, _middles_on_walls(topology)])
-    return Dofs(topology.cells, topology.corners + len(topology.edges), inlet, outlet, walls)
-
-
-def _with_middles(topology: Topology, line: np.ndarray) -> np.ndarray:
-    """(E, 3) nodes of the edges of a line of corners."""
-    a = line[:-1]
-    b = line[1:]
-    return np.column_stack([a, topology.corners + topology.edge_numbers(a, b), b])
-
-
-def _middles_on_walls(topology: Topology) -> np.ndarray:
-    """Middles on both walls: middles of edges that have one triangle and both corners on a wall."""
-    on = np.zeros(topology.corners, bool)
-    on[topology.walls] = True
-    single = np.bincount(topology.cell_edges.ravel(), minlength=len(topology.edges)) == 1
-    along = single & on[topology.edges].all(axis=1) & ~_across(topology)
-    return topology.corners + np.flatnonzero(along)
-
-
-def _across(topology: Topology) -> np.ndarray:
-    """(E,) True where both corners of an edge are on the inlet, or both on the outlet.
-
-    If the inlet or the outlet is a single edge, this edge joins both walls.
-    """
-    lines = [np.isin(topology.edges, line) for line in (topology.inlet, topology.outlet)]
-    return np.any(np.all(lines, axis=2), axis=0)
 
 
 @brief
@@ -313,7 +297,7 @@ class Mesh:
 
         region, loops: as in :class:`Topology`; with one aggregate ``region`` may be boolean.
         """
-        count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
+        count = int(cells[:, :3].max()) + 1
         x, y = points[:count].T
         on_walls = np.flatnonzero(on_any(walls, points[:count]))
 
@@ -339,6 +323,11 @@ class Mesh:
     def geometry(self) -> int:
         """1: straight triangles, 2: curved ones."""
         return self.topology.geometry
+
+    @property
+    def element(self) -> Element:
+        """Nodes and functions of the triangles."""
+        return self.topology.element
 
     @property
     def cells(self) -> np.ndarray:
@@ -378,8 +367,6 @@ class Mesh:
     @cached_property
     def straight(self) -> Mesh:
         """The mesh of the straight triangles between the corners."""
-        if self.geometry == 1:
-            return self
         return replace(self, points=self.points[: self.corners], topology=self.topology.straight)
 
     @cached_property
@@ -430,10 +417,10 @@ class Mesh:
 
     def with_middles(self, field: np.ndarray) -> np.ndarray:
         """(N, ...) values at all nodes of a field (corners, ...) that is linear on every edge."""
-        if self.geometry == 1:
-            return field
-        a, b = self.topology.edges.T
-        return np.concatenate([field, 0.5 * (field[a] + field[b])])
+        nodal = np.empty((len(self.points), *field.shape[1:]), field.dtype)
+        nodal[: self.corners] = field
+        nodal[self.cells[:, 3:]] = self.element.middles(field[self.triangles])
+        return nodal
 
     def from_body(self, values: np.ndarray, outside: np.ndarray | float = 0.0) -> np.ndarray:
         """(N, k) values at all nodes, from values (n, k) at the aggregates' nodes.
@@ -538,14 +525,8 @@ def curved(straight: Mesh, middles: Sequence[np.ndarray] | None) -> Mesh:
     middles: for each aggregate, (M, 2) um, middles of its boundary's edges in the order of the
     loop. If None, all middles are those of the straight edges.
     """
-    topology = straight.topology
-    count = straight.corners
-    points = np.vstack([straight.points, straight.points[topology.edges].mean(axis=1)])
-    cells = np.column_stack([topology.triangles, count + topology.cell_edges])
-    loops = []
-    for number, loop in enumerate(topology.loops):
-        between = count + topology.edge_numbers(loop, np.roll(loop, -1))
-        points[between] = points[between] if middles is None else middles[number]
-        loops.append(np.column_stack([loop, between]).ravel())
-    return replace(straight, points=points,
-                   topology=replace(topology, cells=cells, loops=tuple(loops)))
+    mesh = elements.ELEMENTS[2].with_nodes(straight)
+    points = mesh.points.copy()
+    for loop, between in zip(mesh.topology.loops, middles or ()):
+        points[loop[1::2]] = between
+    return mesh.moved(points)

@@ -264,7 +264,9 @@ class _Fluid:
         outline = self._outlines[number]
         first, _ = _contact(outline, wall)
         _, last = _contact(outline, other)
-        return self._own[number][_backwards(first, last, len(outline.points))]
+        count = len(outline.points)
+        clockwise = (first - np.arange((first - last) % count + 1)) % count
+        return self._own[number][clockwise]
 
     def _point(self, number: int, wall: Wall, last: int) -> np.ndarray:
         """(2,) um, the first (last = 0) or last (last = 1) point of an aggregate on a wall, in the
@@ -290,11 +292,6 @@ class _PointStore:
         first = len(self.points)
         self.points = np.vstack([self.points, points])
         return np.arange(first, len(self.points))
-
-
-def _backwards(first: int, last: int, count: int) -> np.ndarray:
-    """Loop indices from first to last, clockwise, both included."""
-    return (first - np.arange((first - last) % count + 1)) % count
 
 
 def _fill(points: np.ndarray, polygons: list[Polygon],
@@ -404,8 +401,11 @@ def unlocked(straight: Mesh) -> Mesh:
     """
     triangles = straight.triangles.copy()
     region = straight.topology.region
-    for corner in _cornered(triangles, region):
-        _flip(straight.points, triangles, region, corner)
+    cornered = np.flatnonzero(_region_edges(triangles, region).sum(axis=1) == 2)
+    for corner in cornered.tolist():
+        outer = _region_edges(triangles, region)[corner]
+        if outer.sum() == 2:  # an exchange before may have changed it
+            _exchange(straight.points, triangles, corner, int(np.flatnonzero(~outer)[0]))
     return replace(straight, topology=replace(straight.topology, cells=triangles))
 
 
@@ -416,18 +416,6 @@ def _region_edges(triangles: np.ndarray, region: np.ndarray) -> np.ndarray:
     keys += np.repeat(region, 3)
     _, edge_numbers, counts = np.unique(keys, return_inverse=True, return_counts=True)
     return (counts[edge_numbers] == 1).reshape(-1, 3)
-
-
-def _cornered(triangles: np.ndarray, region: np.ndarray) -> np.ndarray:
-    return np.flatnonzero(_region_edges(triangles, region).sum(axis=1) == 2)
-
-
-def _flip(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, corner: int) -> None:
-    """Exchange, in place, the inner edge of a triangle that has two edges on the boundary of its
-    region (see :func:`_exchange`)."""
-    outer = _region_edges(triangles, region)[corner]
-    if outer.sum() == 2:
-        _exchange(points, triangles, corner, int(np.flatnonzero(~outer)[0]))
 
 
 def _exchange(points: np.ndarray, triangles: np.ndarray, triangle: int, edge: int) -> None:

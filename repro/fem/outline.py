@@ -16,6 +16,7 @@ import shapely
 
 from repro.errors import OutsidePore
 from repro.fem.brief import brief
+from repro.fem.elements import ELEMENTS, Element, parabola
 from repro.fem.walls import (
     FREE,
     Seat,
@@ -30,9 +31,6 @@ from repro.fem.walls import (
 #: A corner of the shape at t = 0 keeps its node if the boundary turns there by more than this. The
 #: samples of a spline turn by up to 47 degrees at a tip (member 11 of the hostile scenes).
 SHARP = np.pi / 3
-#: Number of straight lines that replace an arc to compute distances. They err by up to 1/256 of the
-#: arc's sag.
-ON_ARC = 16
 
 
 @brief
@@ -51,6 +49,11 @@ class Outline:
     origin: np.ndarray
     geometry: int = 1
     seat: Seat = Seat()
+
+    @property
+    def element(self) -> Element:
+        """Nodes and functions of the triangles beside it."""
+        return ELEMENTS[self.geometry]
 
     @property
     def upstream(self) -> float:
@@ -104,12 +107,10 @@ class Outline:
 
     @cached_property
     def _ring(self) -> shapely.LinearRing:
-        """The curve, with ON_ARC straight lines in place of an arc."""
-        points = self.points
-        if self.geometry == 2:
-            t = np.arange(ON_ARC) / ON_ARC
-            points = np.einsum("ta,kai->kti", parabola(t), self.arcs(points)).reshape(-1, 2)
-        return shapely.LinearRing(points)
+        """The curve, with straight lines in place of an arc."""
+        t = np.arange(self.element.lines) / self.element.lines
+        points = np.einsum("ta,kai->kti", parabola(t), self.arcs(self.points))
+        return shapely.LinearRing(points.reshape(-1, 2))
 
     @property
     def is_simple(self) -> bool:
@@ -140,8 +141,8 @@ class Outline:
 
     def edges_on(self, wall: int) -> np.ndarray:
         """(e, 2 or 3) numbers of the nodes of each edge on a wall, along the loop."""
-        edges = self.arcs(np.arange(len(self.points)))[self.edge_wall == wall]
-        return edges[:, :: 3 - self.geometry].astype(int)
+        start = self.geometry * np.flatnonzero(self.edge_wall == wall)
+        return (start[:, None] + np.arange(self.geometry + 1)) % len(self.points)
 
     def contact_length(self, wall: Wall) -> float:
         """Length (um) of the contact surface with a wall."""
@@ -178,19 +179,12 @@ class Outline:
 
     def arcs(self, values: np.ndarray) -> np.ndarray:
         """(edges, 3, ...) of nodal values (M, ...), at the start, middle and end of each edge."""
-        if self.geometry == 1:
-            after = np.roll(values, -1, axis=0)
-            return np.stack([values, 0.5 * (values + after), after], axis=1)
-        ends = np.concatenate([values[2::2], values[:1]])
-        return np.stack([values[::2], values[1::2], ends], axis=1)
+        return self.element.arcs(values)
 
     @cached_property
     def _extreme_points(self) -> np.ndarray:
-        """(K, 2) um, points that include the extremes of x and of y."""
-        return np.concatenate([self._peaks(), self.points])
-
-    def _peaks(self) -> np.ndarray:
-        """(K, 2) um, points within an arc at which x or y is stationary.
+        """(K, 2) um, points that include the extremes of x and of y: the nodes, and the points
+        within an arc at which x or y is stationary.
 
         With t from -1 to 1, an arc is m + t (b - a) / 2 + t^2 (a - 2 m + b) / 2.
         """
@@ -199,7 +193,8 @@ class Outline:
         bend = a - 2 * m + b
         arc, axis = np.nonzero(np.abs(along) < 2 * np.abs(bend))
         t = (-0.5 * along[arc, axis] / bend[arc, axis])[:, None]
-        return m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
+        peaks = m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
+        return np.concatenate([peaks, self.points])
 
 
 def polygon_area(points: np.ndarray) -> float:
@@ -225,18 +220,6 @@ def _lenses(arcs: np.ndarray) -> float:
     return float(2 / 3 * np.sum(lens))
 
 
-def parabola(t: np.ndarray) -> np.ndarray:
-    """(..., 3) shape functions of start, middle and end of an arc at t in [0, 1]."""
-    return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
-
-
-def edge_functions(count: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(..., count) shape functions of an edge's 2 or 3 nodes at s in [0, 1], and derivatives."""
-    if count == 2:
-        return np.stack([1 - s, s], axis=-1), np.stack([0 * s - 1, 0 * s + 1], axis=-1)
-    return parabola(s), np.stack([4 * s - 3, 4 - 8 * s, 4 * s - 1], axis=-1)
-
-
 def arc_derivatives(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First derivative by t at t = 0 and second derivative of arcs with nodes (M, 3, ...)."""
     first, middle, last = np.moveaxis(nodes, 1, 0)
@@ -250,8 +233,7 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
     across: number of elements over the radius; wall: the lower wall, y = 0, by default.
     """
     wall = wall or channel_walls(inf)[0]
-    edges = 2 * int(np.ceil(np.pi / 2 * across))
-    edges = geometry * (edges if geometry == 1 else max(6, edges))
+    edges = geometry * max(6, 2 * int(np.ceil(np.pi / 2 * across)))
     angle = np.linspace(0.0, np.pi, edges + 1)
     arc = radius * np.column_stack([np.cos(angle), np.sin(angle)])
     arc[[0, -1], 1] = 0.0
@@ -302,8 +284,7 @@ def polygon(corners: np.ndarray, walls: Walls, geometry: int = 1, smooth: bool =
         points = _with_contact_middle(points, wall)
     wall_numbers = numbers_at(walls, points)
     fixed = _middles(points, walls)
-    if geometry == 2:
-        points, wall_numbers, fixed = _with_arc_middles(points, wall_numbers, fixed)
+    points, wall_numbers, fixed = _with_nodes(ELEMENTS[geometry], points, wall_numbers, fixed)
     return Outline(points, wall_numbers, fixed, points.copy(), geometry, Seat(first.number))
 
 
@@ -407,11 +388,12 @@ def _middles(points: np.ndarray, walls: Walls) -> np.ndarray:
     return fixed
 
 
-def _with_arc_middles(points: np.ndarray, wall: np.ndarray,
-                      fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Insert the middle of each straight edge: points (2 M, 2) um, walls (2 M,), fixed (2 M,)."""
-    after = np.roll(points, -1, axis=0)
-    both = np.stack([points, 0.5 * (points + after)], axis=1).reshape(-1, 2)
+def _with_nodes(element: Element, points: np.ndarray, wall: np.ndarray,
+                fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The loop with all nodes of an element on its straight edges: points (n, 2) um, walls (n,),
+    fixed (n,)."""
     between = np.where(wall == np.roll(wall, -1), wall, FREE)
-    walls = np.stack([wall, between], axis=1).ravel()
-    return both, walls, np.stack([fixed, np.zeros_like(fixed)], axis=1).ravel()
+    inside = np.arange(element.parts) > 0
+    walls = np.where(inside, between[:, None], wall[:, None]).ravel()
+    nodes = element.along(points, np.roll(points, -1, axis=0)).reshape(-1, 2)
+    return nodes, walls, (fixed[:, None] & ~inside).ravel()

@@ -17,7 +17,8 @@ from dataclasses import replace
 import numpy as np
 
 from repro.errors import ContactEroded, ErosionError
-from repro.fem.outline import ON_ARC, Outline, arc_derivatives, parabola
+from repro.fem.elements import ON_ARC
+from repro.fem.outline import Outline, arc_derivatives, parabola
 from repro.fem.walls import FREE, Walls
 
 #: An arc joins a neighbour if the recession leaves less than this part of one of its halves. The

@@ -14,7 +14,7 @@ import numpy as np
 
 from repro.fem import elements
 from repro.fem.elements import Table
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.sizing import SPLIT, with_corners
 from repro.fem.transfer import Located
@@ -237,7 +237,7 @@ def _meshed(mesh: Mesh, parts: _Parts, loops: tuple[np.ndarray, ...],
     straight = Mesh.of(_on_lines(mesh, parts.points), parts.triangles,
                        mesh.topology.region[parts.owner], loops, mesh.walls, mesh.ends,
                        mesh.topology.method)
-    fine = straight if mesh.geometry == 1 else curved(straight, None)
+    fine = mesh.element.with_nodes(straight)
     points = fine.points.copy()
     local = _within(parts.local, elements.nodes(mesh.geometry))
     owner = np.repeat(parts.owner, local.shape[1])

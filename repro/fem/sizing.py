@@ -252,11 +252,9 @@ def with_corners(outline: Outline, edge: np.ndarray, t: np.ndarray) -> Outline:
 
     edge: (K,) numbers of edges, ascending. Each edge begins with a corner, at t = 0.
     """
-    if outline.geometry == 2:
-        after = np.append(t[1:], 0.0)
-        middles = 0.5 * (t + np.where(after > t, after, 1.0))
-        edge, t = np.repeat(edge, 2), np.column_stack([t, middles]).ravel()
-    return placed(outline, edge, t)
+    after = np.append(t[1:], 0.0)
+    places = outline.element.along(t, np.where(after > t, after, 1.0))
+    return placed(outline, np.repeat(edge, outline.geometry), places.ravel())
 
 
 def runs(outline: Outline) -> list[tuple[int, int]]:
@@ -289,8 +287,7 @@ def _on_the_wall(outline: Outline, keep: np.ndarray, sizes: np.ndarray,
     free = polygon.wall == FREE
     ends = polygon.points[keep[[0, -1]]]
     x = graded_line(ends[0], ends[1], polygon.points[free], sizes[free], sizing)[:, 0]
-    if outline.geometry == 2:
-        x = np.insert(x, np.arange(1, len(x)), 0.5 * (x[1:] + x[:-1]))
+    x = np.append(outline.element.along(x[:-1], x[1:]), x[-1])
     sign = np.sign(x[-1] - x[0])
     place = np.searchsorted(sign * polygon.points[keep, 0], sign * x, side="right") - 1
     edge = keep[np.clip(place, 0, len(keep) - 2)]
@@ -316,17 +313,19 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray,
            seed: np.ndarray | None = None) -> Outline:
     """Place nodes (K,), each at t in [0, 1) of an edge; t = 0 is the edge's first corner.
 
-    edge: (K,) numbers of edges; seed: as :meth:`Sizing.middle`. If the origins of both ends of a
-    straight edge are on the seed's arc, a new node gets an origin on this arc too. This edge was
-    round at t = 0, and the elastic stress makes it round again at the next update.
+    edge: (K,) numbers of edges; seed: as :meth:`Sizing.middle`. If an edge was straight at t = 0
+    between two points of the seed's arc, a new node gets an origin on this arc: the edge stands for
+    the arc, and the elastic stress makes it round at the next update.
     """
     first = t == 0
     corner = outline.geometry * edge
-    points, origin = (np.einsum("ka,kai->ki", parabola(t), outline.arcs(part)[edge])
-                      for part in (outline.points, outline.origin))
-    if outline.geometry == 1 and seed is not None:
-        ends = outline.arcs(outline.origin)[edge]
-        origin = seed + _on_arc(origin - seed, ends[:, 0] - seed, ends[:, 2] - seed)
+    arcs = outline.arcs(outline.origin)[edge]
+    points, origin = (np.einsum("ka,kai->ki", parabola(t), nodes)
+                      for nodes in (outline.arcs(outline.points)[edge], arcs))
+    if seed is not None:
+        a, middle, b = arcs.transpose(1, 0, 2)
+        straight = (middle == 0.5 * (a + b)).all(axis=1)[:, None]
+        origin = np.where(straight, seed + _on_arc(origin - seed, a - seed, b - seed), origin)
     wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
     on = touched(wall) != FREE
     points[on, 1] = outline.points[corner[on], 1]

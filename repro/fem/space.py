@@ -105,7 +105,17 @@ class Space:
     @property
     def integration(self) -> Lumped | Quadrature:
         """The rule that integrates the reaction."""
-        return Lumped(self) if self.order == 1 else Quadrature(self)
+        return self.mesh.element.integration(self)
+
+    @property
+    def at_nodes(self) -> Lumped:
+        """Integration at the nodes of linear functions."""
+        return Lumped(self)
+
+    @property
+    def at_points(self) -> Quadrature:
+        """Integration at the quadrature points."""
+        return Quadrature(self)
 
     @cached_property
     def reaction(self) -> Basis:

@@ -20,17 +20,13 @@ import shapely
 from repro.errors import OriginFolded, TransferError, failing_as
 from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem
+from repro.fem.elements import barycentric
 from repro.fem.forms import mass
 from repro.fem.mesh import Mesh, Region, checked_map_derivatives, triangle_areas
 from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
 COVER = 1e-9
-#: Largest number of Newton steps that locate a point in a curved triangle.
-NEWTON_STEPS = 12
-#: Newton's method stops after a step shorter than this on the unit triangle. The error is then of
-#: the order of its square.
-CLOSE = 1e-8
 #: The map of a triangle to t = 0 counts as folded if its least determinant is below this part of
 #: its largest one.
 FOLD = 0.02
@@ -57,16 +53,16 @@ class Located:
 def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
     """Locate points (K, 2) um in triangles (T, 3 or 6).
 
-    Newton's method inverts x(s, t) in every triangle whose box contains the point. The triangle in
-    which the point lies deepest is chosen. A point slightly outside all triangles moves to the edge
-    of the nearest one. Raises TransferError if a point is far from all triangles.
+    Among the triangles whose box contains the point, the one in which it lies deepest is chosen. A
+    point slightly outside all triangles moves to the edge of the nearest one. Raises TransferError
+    if a point is far from all triangles.
     """
     nodes = points[cells]
     size = np.ptp(nodes, axis=1).max(axis=1)
     low = nodes.min(axis=1) - 0.1 * size[:, None]
     high = nodes.max(axis=1) + 0.1 * size[:, None]
     place, cell = shapely.STRtree(shapely.box(*low.T, *high.T)).query(shapely.points(where))
-    local = _inverted(nodes[cell], where[place], elements.order_of(cells))
+    local = elements.element_of(cells).local(nodes[cell], where[place])
     depth = elements.values(1, local).min(axis=1)
     best = np.lexsort((-depth, place))
     first = best[np.unique(place[best], return_index=True)[1]]
@@ -76,52 +72,11 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
     return Located(cell[first], _inside(local[first]))
 
 
-def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray:
-    """(K, 2) coordinates on the unit triangle of points (K, 2) um in triangles (K, g, 2) um.
-
-    Where Newton's method does not converge, the result is far outside the unit triangle.
-    """
-    if geometry == 1:
-        return barycentric(nodes, where)[:, 1:]
-    local = np.clip(barycentric(nodes[:, :3], where)[:, 1:], -2.0, 3.0)
-    rest = np.arange(len(where))
-    for _ in range(NEWTON_STEPS):
-        guess = local[rest]
-        corners = nodes[rest]
-        values, gradients = elements.evaluated(2, guess)
-        offset = (values[:, None] @ corners)[:, 0] - where[rest]
-        J = np.swapaxes(corners, 1, 2) @ gradients
-        det = elements.determinant(J)
-        det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
-        ds = J[:, 1, 1] * offset[:, 0] - J[:, 0, 1] * offset[:, 1]
-        dt = J[:, 0, 0] * offset[:, 1] - J[:, 1, 0] * offset[:, 0]
-        step = np.stack([ds, dt], axis=1) / det[:, None]
-        local[rest] = np.clip(guess - step, -2.0, 3.0)
-        rest = rest[np.abs(step).max(axis=1) >= CLOSE]
-        if len(rest) == 0:
-            break
-    offset = np.einsum("ka,kai->ki", elements.values(2, local), nodes) - where
-    lost = np.hypot(*offset.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
-    return np.where(lost[:, None], 99.0, local)
-
-
 def _inside(local: np.ndarray) -> np.ndarray:
     """Points (K, 2) on the unit triangle; points outside move to its edge."""
     L = np.clip(elements.values(1, local), 0.0, None)
     s, t = (L / L.sum(axis=1, keepdims=True))[:, 1:].T
     return np.column_stack([s, np.minimum(t, 1 - s)])  # 1 - s - t is not negative to the last bit
-
-
-def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(..., 3) barycentric coordinates of points (..., 2) in triangles (..., 3, 2)."""
-    a, b, c = (corners[..., i, :] for i in range(3))
-
-    def cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-
-    double = cross(b - a, c - a)
-    a, b, c = (corner - where for corner in (a, b, c))
-    return np.stack([cross(b, c), cross(c, a), cross(a, b)], -1) / double[..., None]
 
 
 def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray,
@@ -158,8 +113,7 @@ def unfolded(mesh: Mesh, origin: np.ndarray, region: Region) -> np.ndarray:
         if len(bad) == 0:
             return origin
         straight = origin.copy()
-        if mesh.geometry == 2:
-            straight[bad[:, 3:]] = 0.5 * (origin[bad[:, :3]] + origin[bad[:, elements.NEXT]])
+        straight[bad[:, 3:]] = elements.element_of(cells).middles(origin[bad[:, :3]])
         if (straight == origin).all():
             x, y = mesh.points[bad[0]].mean(axis=0)
             raise OriginFolded(f"after a remesh the places at t = 0 fold near x = {x:.4g}, "

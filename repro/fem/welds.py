@@ -19,7 +19,8 @@ import numpy as np
 
 from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
-from repro.fem.outline import ON_ARC, Outline, area_beside_chord, parabola
+from repro.fem.elements import ON_ARC
+from repro.fem.outline import Outline, area_beside_chord, parabola
 from repro.fem.sizing import Sizing, cut, placed
 from repro.fem.walls import FREE, WELD, touched
 

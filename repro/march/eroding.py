@@ -30,17 +30,17 @@ from repro.scene import needed
 
 def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
             largest_change: float = np.inf, search: SearchOptions = PATIENT,
-            known: tuple[GeneratedMesh, ...] = ()) -> Attempt:
+            meshes: tuple[GeneratedMesh, ...] = ()) -> Attempt:
     """Attempt a step of ``duration`` (h) with erosion.
 
     Arguments and errors are those of :func:`midpoint.attempt`. Also raises ErosionError if a
     surface recedes too far, and Detachment if a contact surface vanishes.
     """
     if not previous.bodies:
-        return midpoint.attempt(stages, previous, solved, duration, largest_change, search, known)
+        return midpoint.attempt(stages, previous, solved, duration, largest_change, search, meshes)
     start, at_start = stages.grading.solve(_erode(stages, previous, duration / 2, solved))
     start = replace(start, concentrations=at_start.concentrations)
-    grown = midpoint.attempt(stages, start, at_start, duration, largest_change, search, known)
+    grown = midpoint.attempt(stages, start, at_start, duration, largest_change, search, meshes)
     if grown.step is None:
         return grown
     end = _erode(stages, grown.step.pore, duration / 2, at_start)

@@ -57,7 +57,7 @@ class Stepping:
     solution after it and the step control of the next step. The length of the step does not depend
     on ``growth.end`` or on the requested rows. A step that passes ``growth.end`` is cut there. At a
     jump of the scene's tables the solution is that before the jump.
-    cut(stages, pore, solved, time, known): makes a shorter step to a time (h), as
+    cut(stages, pore, solved, time, meshes): makes a shorter step to a time (h), as
     :func:`midpoint.attempt`. Returns its StepResult and the solution after it.
     rows(growth): times (h) of rows without ``output.times``, besides the ends of steps.
     first: length of the first attempted step, as a multiple of growth.time_step.

@@ -77,11 +77,11 @@ class Halfway:
 
 def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
             largest_change: float = np.inf, search: SearchOptions = PATIENT,
-            known: tuple[GeneratedMesh, ...] = ()) -> Attempt:
+            meshes: tuple[GeneratedMesh, ...] = ()) -> Attempt:
     """Attempt a step of ``duration`` (h).
 
     The step succeeds if the rates change by at most ``largest_change`` (1/h) over its first half.
-    known: meshes that other steps from the same start have generated. One of them replaces a new
+    meshes: meshes that other steps from the same start have generated. One of them replaces a new
     mesh at the end, if possible. Raises StageError if a stage fails, and RunEnd if the step passes
     an end of the pore or if aggregates overlap.
     """
@@ -104,7 +104,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     refuse_outside(stages.channel, previous, expanded)
     refuse_fold(expanded)
     expanded = replace(expanded, concentrations=_guess_substrates(solved, half, 1.0))
-    new, remeshed = stages.new_mesh(previous, expanded, solved, known)
+    new, remeshed = stages.new_mesh(previous, expanded, solved, meshes)
     generated = (GeneratedMesh(expanded, new),) if remeshed else ()
     refuse_density(previous, new, stages.remeshing.maximum_density)
     makes_contact = expanded.spanning > previous.spanning
@@ -115,7 +115,7 @@ def attempt(stages: Stages, previous: Pore, solved: Solved, duration: float,
     complete = replace(half, generated=half.generated + generated, end=expansion)
     inner = partial(interpolate, stages, previous, solved, complete)
     step = StepResult(new, None, ledger, remeshed, expansion.iterations, inner,
-                      generated=generated + known)
+                      generated=generated + meshes)
     return Attempt(step, change, expansion.gaps if makes_contact else None)
 
 
@@ -260,18 +260,14 @@ def _match_production(previous: Pore, after: Pore,
 
 
 def _guess_substrates(start: Solved, half: Halfway, part: float) -> Concentrations:
-    """Initial guess of the substrates at a fraction of the step."""
-    first = start.substrates.concentrations
-    return _extrapolate_substrates(first, half.solved.substrates.concentrations, part)
+    """Initial guess of the substrates at a fraction ``part`` of the step.
 
-
-def _extrapolate_substrates(first: Concentrations, second: Concentrations,
-                            part: float) -> Concentrations:
-    """Extrapolate concentrations from the start and half way to a fraction ``part`` of the step.
-
-    The result is ``second``, the solution half way, if the extrapolation is negative anywhere. It
-    is ``first``, the solution at the start, if the mesh has changed half way.
+    Concentrations are extrapolated from the start and half way. The guess is the solution half way
+    if the extrapolation is negative anywhere, and the solution at the start if the mesh has changed
+    half way.
     """
+    first = start.substrates.concentrations
+    second = half.solved.substrates.concentrations
     if second.fields.shape != first.fields.shape:
         return first
     fields = first.fields + 2 * part * (second.fields - first.fields)
@@ -313,10 +309,10 @@ def _guess_shape(previous: Pore, shapes: list[tuple[float, Expansion]]) -> Pore:
     If this turns a triangle over, the guess is the shape half way, or the one at the start.
     """
     corners = previous.mesh.corners
-    for known in (shapes, [(1.0, shapes[0][1])]):
+    for candidates in (shapes, [(1.0, shapes[0][1])]):
         push = previous.pressure
         points = previous.mesh.points
-        for weight, shape in known:
+        for weight, shape in candidates:
             push = push + weight * (shape.pore.pressure[:corners] - previous.pressure)
             points = points + weight * (shape.position - previous.mesh.points)
         guess = _place_bodies(replace(previous, pressure=push), points)

@@ -14,7 +14,6 @@ from repro.errors import SimulationError, StageError
 from repro.fem.brief import brief
 from repro.march.step_control import StepControl
 from repro.model.advice import with_advice
-from repro.model.body import Body
 from repro.model.pore import Pore
 from repro.model.solving import Solved
 
@@ -159,14 +158,11 @@ def contiguous(pore: Pore) -> Pore:
     state = pore.concentrations
     mesh = _contiguous_arrays(pore.mesh)
     copied = replace(_contiguous_arrays(pore), concentrations=state and _contiguous_arrays(state),
-                     bodies=tuple(map(_contiguous_body, pore.bodies)))
+                     bodies=tuple(replace(
+                         _contiguous_arrays(body), solid=_contiguous_arrays(body.solid),
+                         configuration=_contiguous_arrays(body.configuration))
+                         for body in pore.bodies))
     return copied if mesh is pore.mesh else replace(copied, space=replace(pore.space, mesh=mesh))
-
-
-def _contiguous_body(body: Body) -> Body:
-    """Return the same aggregate with contiguous arrays."""
-    return replace(_contiguous_arrays(body), solid=_contiguous_arrays(body.solid),
-                   configuration=_contiguous_arrays(body.configuration))
 
 
 def _contiguous_arrays(data: Data) -> Data:

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Limits of the ratio of consecutive steps.
+#: Limit of the ratio of consecutive steps, and of its inverse.
 FASTER = 5.0
-SLOWER = 0.2
 #: Least length of a step over growth.time_step. A step that fails or misses the tolerance is
 #: shortened and repeated, down to this length. A step of this length that misses the tolerance is
 #: accepted, and a warning reports it.
@@ -55,7 +54,7 @@ def allowed_ratio(estimate: float, tolerance: float, largest: float = FASTER) ->
     """Ratio of the length that the tolerance allows to the length of the step with ``estimate``."""
     if estimate <= 0:
         return largest
-    return min(largest, max(SLOWER, SAFETY * (tolerance / estimate) ** 0.5))
+    return min(largest, max(1 / FASTER, SAFETY * (tolerance / estimate) ** 0.5))
 
 
 def exceeds_tolerance(control: StepControl, tolerance: float) -> bool:
@@ -74,5 +73,5 @@ def next_step_size(control: StepControl, duration: float, estimate: float,
     factor = allowed_ratio(estimate, tolerance, largest)
     if control.estimate > 0 and estimate > 0:
         rise = max(1.0, (estimate / control.estimate) ** 0.5 * control.duration / duration)
-        factor = min(factor, max(SLOWER, allowed_ratio(estimate, tolerance, np.inf) / rise))
+        factor = min(factor, max(1 / FASTER, allowed_ratio(estimate, tolerance, np.inf) / rise))
     return StepControl(duration * factor, duration, estimate)

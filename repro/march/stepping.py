@@ -15,7 +15,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +32,7 @@ from repro.march.step_control import (
     fit_to_interval,
     next_step_size,
 )
-from repro.model.contact_lines import PATIENT, SearchOptions
+from repro.model.contact_lines import SearchOptions
 from repro.model.pore import Pore
 from repro.model.remeshing import GeneratedMesh
 from repro.model.solving import Solved
@@ -90,20 +89,22 @@ def _row(stages: Stages, previous: Pore, solved: Solved, control: StepControl,
     return InterpolatedState(replace(previous, time=time), solved)
 
 
-def _attempt(stages: Stages, *arguments: Any) -> Attempt:
-    """Attempt a step, by :func:`midpoint.attempt`, or by :func:`eroding.attempt` with erosion."""
+def _attempt_of(stages: Stages) -> Callable[..., Attempt]:
+    """How a step is attempted: :func:`midpoint.attempt`, or :func:`eroding.attempt` with erosion.
+    """
     if stages.erosion is None:
-        return midpoint.attempt(stages, *arguments)
+        return midpoint.attempt
     from repro.march import eroding  # a scene without erosion does not load it
-    return eroding.attempt(stages, *arguments)
+    return eroding.attempt
 
 
 def _cut(stages: Stages, previous: Pore, solved: Solved, time: float,
-         known: tuple[GeneratedMesh, ...] = ()) -> tuple[StepResult, Solved]:
+         meshes: tuple[GeneratedMesh, ...] = ()) -> tuple[StepResult, Solved]:
     """Make a step to a time (h) before the end of a step that is accepted."""
+    attempt = _attempt_of(stages)
     while True:
         try:
-            trial = _attempt(stages, previous, solved, time - previous.time, np.inf, PATIENT, known)
+            trial = attempt(stages, previous, solved, time - previous.time, meshes=meshes)
             break
         except Unresolved:
             finer = _halve_elements(stages, previous)
@@ -125,6 +126,7 @@ def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepCont
     Returns the step, the solution after it, and the next step control. Raises StageError,
     FloatingPointError or RunEnd if the shortest step fails.
     """
+    attempt = _attempt_of(stages)
     tolerance = stages.tolerance
     time_step = stages.growth.time_step
     shortest = SHORTEST * time_step
@@ -137,7 +139,7 @@ def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepCont
         largest_change = np.inf if last else EXCESS * tolerance / duration
         try:
             search = SearchOptions(landing=0.0 if last else LANDED, patient=last)
-            trial = _attempt(stages, previous, solved, duration, largest_change, search)
+            trial = attempt(stages, previous, solved, duration, largest_change, search)
             estimate = trial.change * duration
             if trial.step:
                 end = _end_of(previous, duration, corner)

@@ -75,9 +75,9 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
 
 
 def _cut(stages: Stages, previous: Pore, solved: Solved, time: float,
-         known: tuple[GeneratedMesh, ...] = ()) -> tuple[StepResult, Solved]:
+         meshes: tuple[GeneratedMesh, ...] = ()) -> tuple[StepResult, Solved]:
     """Make a step to a time (h), and solve at its end, just before a jump of the tables there."""
-    advanced = step(stages, previous, solved, time - previous.time, known)
+    advanced = step(stages, previous, solved, time - previous.time, meshes)
     after = contiguous(replace(advanced.pore, time=time))
     solved = stages.solver.solve(before_jump(stages.tables, after))
     return replace(advanced, pore=after), solved
@@ -91,8 +91,8 @@ def _interpolate(stages: Stages, previous: Pore, solved: Solved, time: float) ->
 
 
 def step(stages: Stages, previous: Pore, solved: Solved, duration: float,
-         known: tuple[GeneratedMesh, ...] = ()) -> StepResult:
-    """Make one step of ``duration`` (h): biomass, shape, mesh; known: as for
+         meshes: tuple[GeneratedMesh, ...] = ()) -> StepResult:
+    """Make one step of ``duration`` (h): biomass, shape, mesh; meshes: as for
     :func:`midpoint.attempt`."""
     within = partial(_interpolate, stages, previous, solved)
     solved = _solve_midway(stages, previous, solved, duration)
@@ -103,13 +103,13 @@ def step(stages: Stages, previous: Pore, solved: Solved, duration: float,
     refuse_outside(stages.channel, previous, expanded)
     refuse_fold(expanded)
     expanded = replace(expanded, concentrations=end)
-    after, remeshed = stages.new_mesh(previous, expanded, solved, known)
+    after, remeshed = stages.new_mesh(previous, expanded, solved, meshes)
     generated = (GeneratedMesh(expanded, after),) if remeshed else ()
     ledger = Ledger(previous.time, previous.time + duration, *flows[:4], previous.mass,
                     grown.mass - previous.mass, after.mass, flows.unmet)
     last = replace(grown, time=previous.time + duration), replace(solved, concentrations=end)
     return StepResult(after, last, ledger, remeshed, expansion.iterations, within,
-                      generated=generated + known)
+                      generated=generated + meshes)
 
 
 def _expand(stages: Stages, previous: Pore, grown: Pore) -> Expansion:

@@ -35,7 +35,7 @@ import numpy as np
 from repro.errors import GrowthError
 from repro.fem import elements
 from repro.fem.mesh import Mesh, Region
-from repro.fem.outline import Outline, edge_functions
+from repro.fem.outline import Outline
 from repro.fem.sizing import GRADATION
 from repro.fem.walls import Wall
 from repro.model import flow, growth, traction
@@ -280,7 +280,7 @@ class _Surface:
 
     def _at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(p, k) shape functions of an edge's k nodes at s (p,) in [0, 1], and derivatives."""
-        return edge_functions(self.nodes.shape[1], s)
+        return elements.ELEMENTS[self.nodes.shape[1] - 1].on_edge(s)
 
     def density(self, forces: np.ndarray) -> np.ndarray:
         """(N,) MPa, traction at the nodes of the surface, from nodal forces (N,) MPa um."""

@@ -117,7 +117,8 @@ class Erosion:
         walls = pore.mesh.walls
         shears = self._shears(pore, pore.outlines)
         whole = [self._prepared(pore, *each, duration) for each in zip(pore.outlines, shears)]
-        halves = [self._receded(pore, *each, duration / 2) for each in zip(whole, shears)]
+        halves = [recession.moved(outline, duration / 2 * self._velocities(pore, outline, shear))
+                  for outline, shear in zip(whole, shears)]
         shears = self._shears(pore, halves)
         receded = [recession.moved(outline, duration * self._velocities(pore, half, shear))
                    for outline, half, shear in zip(whole, halves, shears)]
@@ -149,10 +150,6 @@ class Erosion:
         """(M, 2) um/h of the nodes of an outline."""
         return self._speeds(pore, outline, shear)[:, None] * recession.directions(outline)
 
-    def _receded(self, pore: Pore, outline: Outline, shear: Shear, duration: float) -> Outline:
-        """An outline after a duration (h) with its speed at the start."""
-        return recession.moved(outline, duration * self._velocities(pore, outline, shear))
-
     def _prepared(self, pore: Pore, outline: Outline, shear: Shear, duration: float) -> Outline:
         """The outline after arcs that shrink too much in a duration (h) have joined neighbours."""
         while True:
@@ -165,7 +162,7 @@ class Erosion:
     def _shears(self, pore: Pore, outlines: Sequence[Outline]) -> list[Shear]:
         """The shear of the water on each outline, at the time of a pore."""
         if not self.law.follows_water:
-            return [_no_shear for _ in outlines]
+            return [lambda outline: np.zeros(len(outline.points))] * len(outlines)
         space = pore.space
         if outlines is not pore.outlines:
             mesh, outlines = self.remeshing.meshing.around(outlines, pore.front)
@@ -174,11 +171,6 @@ class Erosion:
         water = self.solver.solve_flow(space, drive)
         return [_along(outline, surface_shear(space, water, drive, outline, region))
                 for outline, region in zip(outlines, space.mesh.regions)]
-
-
-def _no_shear(outline: Outline) -> np.ndarray:
-    """(M,) MPa: zero."""
-    return np.zeros(len(outline.points))
 
 
 def _along(outline: Outline, shear: np.ndarray) -> Shear:

@@ -97,6 +97,11 @@ class Linear:
     tau: np.ndarray
 
     @staticmethod
+    def splits(resistance: Resistance) -> bool:
+        """May the pressure jump across the interface? With tau each corner has one pressure."""
+        return False
+
+    @staticmethod
     def on(velocity: Space, viscosity: np.ndarray) -> Linear:
         """The pair with the paper's stabilisation; viscosity: (T,) nu_r."""
         return Linear(velocity, tau(velocity.mesh, viscosity))
@@ -123,7 +128,8 @@ class Linear:
         """The flow of a velocity and a pressure, with the loss (6)."""
         mesh = self.velocity.mesh
         slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
-        return UnitFlow(u, pressure, self.tau[:, None] * slope, _drop(self.velocity, pressure))
+        loss = self.velocity.inlet.mean(pressure) - self.velocity.outlet.mean(pressure)
+        return UnitFlow(u, pressure, self.tau[:, None] * slope, loss)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +138,11 @@ class TaylorHood:
 
     velocity: Space
     lower: None = None
+
+    @staticmethod
+    def splits(resistance: Resistance) -> bool:
+        """May the pressure jump across the interface? Each side then has its own pressure."""
+        return resistance.pressure_jumps
 
     @staticmethod
     def on(velocity: Space, viscosity: np.ndarray) -> TaylorHood:
@@ -180,11 +191,12 @@ def unit_flow(velocity: Space, resistance: Resistance = WATER, *,
               interface: Interface = LAPLACIAN) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5); see :func:`solve`."""
     mesh = velocity.mesh
-    splits = velocity.order > 1 and resistance.pressure_jumps
+    kind = PAIRS[velocity.order]
+    splits = kind.splits(resistance)
     system = mesh.topology.system(("flow", interface, splits),
                                   lambda: _system(velocity, interface, splits))
     system, viscosity, drag = resistance.terms(velocity, system)
-    pair = PAIRS[velocity.order].on(velocity, viscosity)
+    pair = kind.on(velocity, viscosity)
     blocks = stokes(velocity, viscosity, interface, pair.lower, drag)
     value = np.zeros(len(system.constrained))
     value[: 2 * velocity.count] = pair.prescribed()
@@ -250,11 +262,6 @@ def work(load: np.ndarray, solution: np.ndarray, width: float) -> float:
     (2n + m,), of the system.
     """
     return float(load @ solution) / width
-
-
-def _drop(space: Space, pressure: np.ndarray) -> float:
-    """Mean pressure at the inlet minus mean pressure at the outlet (6)."""
-    return space.inlet.mean(pressure) - space.outlet.mean(pressure)
 
 
 def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:

@@ -39,7 +39,6 @@ from repro.fem.assembly import ElementSystem
 from repro.fem.space import Space
 from repro.model.kinetics import Sink
 from repro.model.transport import (
-    UNRESOLVED,
     Concentrations,
     Flows,
     Problem,
@@ -55,9 +54,6 @@ from repro.timing import timed
 #: biomass made or uptake is 2e-2 at a tolerance of 1e-1, 9e-4 at 1e-2, and 3.1e-4 at 1e-3. The
 #: tolerance therefore stays at 0.1 %.
 TOLERANCE = 1e-3
-#: {order of the elements: part of its supply by which a concentration may be below zero}. With
-#: linear elements the lumped reaction keeps concentrations positive.
-BELOW_ZERO = {1: 0.0, 2: UNRESOLVED}
 #: Bounds on the ratio of successive steps.
 LONGER = 2.0
 SHORTER = 0.2
@@ -166,7 +162,7 @@ class System:
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """The equations of the modelled substrates."""
-        return tuple(map(self._row, range(len(self.problem.both))))
+        return tuple(map(self._row, range(len(self.problem.kinds))))
 
     def _row(self, s: int) -> Row:
         problem = self.problem
@@ -174,7 +170,7 @@ class System:
         operator = self.sparse.entries(0, problem.matrices[s])
         storage = self.sparse.entries(0, self.storage)
         return Row(operator, storage, problem.operator[unknowns, unknowns], self.mass,
-                   problem.source[unknowns], problem.both[s].supply)
+                   problem.source[unknowns], problem.kinds[s].supply)
 
     @cached_property
     def mass(self) -> sp.csc_matrix:
@@ -222,7 +218,7 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     active = nothing if sink is None else sink.active
     system, level = _started(problem, active, nothing, start, living=False)
     system = replace(system, watched=np.ones(problem.space.count, bool))
-    monotone = problem.law is None or problem.law.both.monotone
+    monotone = problem.law is None or problem.law.uptake_law.monotone
     most = SETTLING if monotone else SETTLING / FASTER
     step = LONG
     last = rate = np.inf
@@ -315,7 +311,7 @@ def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Con
              living: bool = True, simultaneous: bool = False) -> tuple[System, Level]:
     """The system and its first time level."""
     fields = start.fields
-    largest = np.maximum([s.supply for s in problem.both], fields.max(axis=1))
+    largest = np.maximum([s.supply for s in problem.kinds], fields.max(axis=1))
     scale = np.where(largest > 0, largest, 1.0)[:, None]
     watched = np.zeros(problem.space.count, bool)
     watched[problem.space.reaction.cells] = True
@@ -365,7 +361,7 @@ def _tried(system: System, level: Level, step: float,
 
 def _lowest(problem: Problem) -> np.ndarray:
     """(s, 1) least accepted concentrations, mg/L."""
-    return np.array([[-BELOW_ZERO[problem.space.order] * s.supply] for s in problem.both])
+    return np.array([[-problem.scheme.undershoot * s.supply] for s in problem.kinds])
 
 
 def _factor(tolerance: float, size: float) -> float:
@@ -437,7 +433,7 @@ def _unmet(system: System, active: np.ndarray, fields: np.ndarray) -> np.ndarray
     law = system.problem.law
     if law is None:
         return np.zeros(2)
-    return Sink(active).unmet(law.both.fraction(system.space.reaction.evaluate(fields)), law)
+    return Sink(active).unmet(law.uptake_law.fraction(system.space.reaction.evaluate(fields)), law)
 
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,

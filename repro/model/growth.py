@@ -88,9 +88,8 @@ def internal_forces(solid: Solid, theta: np.ndarray, position: np.ndarray,
     position: (n, 2) um; pressure: (corners,) P / mu_L. External forces equal to these keep the
     aggregate in this position.
     """
-    system = System(solid, np.zeros(position.shape, bool))
-    if solid.shape.geometry == 1:
-        system.stabilisation = PressureGradient.on(solid, position)
+    stabilisation = STABILISATIONS[solid.shape.geometry].on(solid, position)
+    system = System(solid, np.zeros(position.shape, bool), stabilisation=stabilisation)
     forces = system.under(theta, position, position, pressure).residual
     return forces[: position.size].reshape(2, -1).T
 

@@ -48,7 +48,7 @@ class RateLaw:
     ----------
     constants : Kinetics
         k, Y, b, f_d, d_c and F.
-    both : UptakeLaw
+    uptake_law : UptakeLaw
         The law of uptake of all modelled substrates.
     modelled : slice
         Indices of the modelled substrates in (acceptor, donor).
@@ -60,7 +60,7 @@ class RateLaw:
     """
 
     constants: Kinetics
-    both: UptakeLaw
+    uptake_law: UptakeLaw
     modelled: slice
 
     def on(self, space: Space, substrates: Substrates) -> RateLaw:
@@ -71,18 +71,18 @@ class RateLaw:
         node. A concentration C penetrates to the depth (2 D C / (q X_m))^1/2. The square of
         thickness over depth is K / (2 C).
         """
-        if not self.both.sharp:
+        if not self.uptake_law.sharp:
             return self
         squares = THINNEST**2 * space.reaction.dx.sum(axis=1)[:, None]
         uptakes = self.constants.maximum_density * np.array(self.uptake_at(1.0, 1.0)[self.modelled])
         inside = [kind.diffusivity_in_aggregate for kind in substrates.modelled.values()]
         smallest = (uptakes / inside)[:, None, None] * squares
-        return replace(self, both=replace(self.both, half_saturation=smallest))
+        return replace(self, uptake_law=replace(self.uptake_law, half_saturation=smallest))
 
     def fractions(self, *concentrations: Values) -> tuple[Any, Any]:
         """m_A and m_D; 1 for a substrate that is not modelled."""
         pair: list[Any] = [np.ones_like(concentrations[0])] * 2
-        pair[self.modelled] = [law.fraction(c) for law, c in zip(self.both, concentrations)]
+        pair[self.modelled] = [law.fraction(c) for law, c in zip(self.uptake_law, concentrations)]
         return pair[0], pair[1]
 
     def completed(self, fractions: np.ndarray) -> np.ndarray:
@@ -118,7 +118,7 @@ class RateLaw:
     def own_uptake(self, substrate: int, *concentrations: Values) -> tuple[Values, Values]:
         """Uptake of one substrate, extended below zero in its own concentration, and the derivative
         by this concentration; substrate: its index among the modelled substrates."""
-        fraction, slope = tuple(self.both)[substrate].extended(concentrations[substrate])
+        fraction, slope = tuple(self.uptake_law)[substrate].extended(concentrations[substrate])
         m_a, m_d = self.fractions(*concentrations)
         is_acceptor = self.modelled.start + substrate == 0
         per_own = self.per_acceptor(m_d) if is_acceptor else self.per_donor(m_a)

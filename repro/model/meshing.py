@@ -30,8 +30,6 @@ from repro.scene import Aggregate, Growth, Numerics, Scene, Substrates, at_large
 from repro.scene import Flow as Drive
 from repro.scene import Pore as Channel
 
-#: Thinnest film to resolve (um, Table 1) in a scene without growth.minimum_film.
-MINIMUM_FILM = 2.0
 #: The largest refinement that scenes accept.
 MOST_REFINED = 20.0
 #: Refinement of quadratic elements over Pe^(1/3): the concentration boundary layer is W Pe^(-1/3)
@@ -41,9 +39,7 @@ BOUNDARY_LAYER = 0.15
 #: Largest refinement for layers. A finer mesh has more nodes, the square of this, than the 32-bit
 #: indices of sparse matrices can count.
 FINEST_LAYERS = 2.0**15.5
-#: {order of the elements: divisor}. The edges at the tips of an outline have the length W /
-#: (divisor refinement^2) (W / 200 in the presets paper and fast), but at least W / MOST_AT_TIPS.
-AT_TIPS = {1: 200.0, 2: 5000.0}
+#: The edges at the tips of an outline are at least W over this long.
 MOST_AT_TIPS = 20_000.0
 
 
@@ -65,8 +61,10 @@ def whole_width_of(scene: Scene) -> float:
 
 def film(scene: Scene) -> float:
     """Thickness (um) below which a film closes. It is also the thinnest film that a mesh resolves.
+
+    Without growth it is the default of growth.minimum_film.
     """
-    return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
+    return (scene.growth or Growth(end=0.0)).minimum_film
 
 
 def least_gap(scene: Scene) -> float:
@@ -210,7 +208,7 @@ class Meshing:
 
 def size_at_tips(numerics: Numerics, width: float) -> float:
     """Length (um) of the edges at an outline's tips; width: of the pore, um."""
-    finest = min(AT_TIPS[numerics.scheme.order] * numerics.refinement**2, MOST_AT_TIPS)
+    finest = min(numerics.scheme.edges_at_tips * numerics.refinement**2, MOST_AT_TIPS)
     return width / finest
 
 

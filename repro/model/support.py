@@ -23,7 +23,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro.fem.elements import ELEMENTS
-from repro.fem.outline import edge_functions
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +49,9 @@ class Support:
 def lengths_along(edges: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """(n,) um, the integrals of the shape functions along edges; arguments of :meth:`Support.on`.
     """
-    nodes = edges.shape[1]
-    _, slopes = edge_functions(nodes, np.linspace(0, 1, nodes))
-    weights = ELEMENTS[nodes - 1].edge_weights
-    lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * weights
+    element = ELEMENTS[edges.shape[1] - 1]
+    _, slopes = element.on_edge(np.arange(edges.shape[1]) / element.parts)
+    lengths = np.linalg.norm(slopes @ reference[edges], axis=2) * element.edge_weights
     return np.bincount(edges.ravel(), lengths.ravel(), len(reference))
 
 

@@ -28,8 +28,6 @@ BESIDE = 0.05
 #: Definition of the stretch, for reports.
 STRETCH = ("length along the surface over that in the configuration from which strain counts, over "
            "J^(1/2), in the middle of an edge")
-#: The middles of the edges 01, 12 and 20 of the unit triangle.
-MIDDLES = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 
 
 @brief
@@ -102,7 +100,7 @@ def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
     nodes: (edges, 3 or 6, 2) um, of the triangle beside each edge; local: (edges,) number of the
     edge in this triangle.
     """
-    derivatives = elements.derivatives(elements.order_of(nodes), MIDDLES)
+    derivatives = elements.derivatives(elements.order_of(nodes), elements.nodes(2)[3:])
     return elements.determinant(np.einsum("eai,eak->eik", nodes, derivatives[local]))
 
 

@@ -52,10 +52,6 @@ SATURATED = 0.9
 SWITCH = 0.5
 #: A concentration is not resolved if it is below zero by more than this part of its supply.
 UNRESOLVED = 1e-3
-#: A concentration is not resolved if it is above its supply by more than this part of the supply.
-OVERSHOOT = 0.02
-#: {order of the elements: largest accepted concentration over its supply}.
-HIGHEST = {1: np.inf, 2: 1 + OVERSHOOT}
 #: The uptake is not resolved if its relative difference from a quadrature of a degree higher by
 #: FINER is above APART. Both quadratures use the same concentrations. In base with fronts of half
 #: saturations from 1e-1 to 1e-6 of the supply, the error of the biomass made in 2 h was at most a
@@ -72,8 +68,8 @@ class Problem:
     matrices: for each substrate, (T, k, k) um2/h, without uptake; operator: (sn, sn) of all
     substrates, uncoupled; magnitude: absolute values of its entries; source: (sn,) um2 mg/L/h;
     inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of all substrates,
-    coupled in biomass; law: None without biomass; modified_newton: does Newton's method keep its
-    derivative as long as the defect decreases fast enough?
+    coupled in biomass; law: None without biomass; scheme: its limits of the concentrations and its
+    Newton's method.
     """
 
     space: Space
@@ -86,7 +82,7 @@ class Problem:
     system: ElementSystem
     substrates: Substrates
     law: RateLaw | None
-    modified_newton: bool
+    scheme: Scheme
 
     @property
     def mesh(self) -> Mesh:
@@ -94,7 +90,7 @@ class Problem:
         return self.space.mesh
 
     @property
-    def both(self) -> tuple[Substrate, ...]:
+    def kinds(self) -> tuple[Substrate, ...]:
         """The modelled substrates, as the scene describes them, the acceptor first."""
         return tuple(self.substrates.modelled.values())
 
@@ -106,7 +102,7 @@ class Problem:
     @property
     def supply(self) -> np.ndarray:
         """(sn,) mg/L, supply of one substrate at all nodes, then of the other substrate."""
-        return np.repeat([s.supply for s in self.both], self.space.count)
+        return np.repeat([s.supply for s in self.kinds], self.space.count)
 
 
 @brief
@@ -157,7 +153,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     kinetics : Kinetics, optional
         None without biomass.
     scheme : Scheme
-        Determines inlet, carrier and Newton's method.
+        Determines inlet, carrier, the limits of the concentrations and Newton's method.
 
     Returns
     -------
@@ -169,7 +165,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     carried, source, inflow, outflow = _through(space, flow, scheme)
     matrices = tuple(diffusion(space, kind) + carried for kind in kinds)
     constrained = flow is None and substrates.boundary == "open"
-    uncoupled = topology.system(("both", count), lambda: _apart(space, count))
+    uncoupled = topology.system(("uncoupled", count), lambda: _apart(space, count))
     operator = uncoupled.matrix(matrices)
     system = coupled_system(space, constrained, count)
     magnitude = copy(operator)
@@ -177,7 +173,7 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
     sources = np.concatenate([kind.supply * source for kind in kinds])
     law = None if kinetics is None else rate_law(substrates, kinetics).on(space, substrates)
     return Problem(space, matrices, operator, magnitude, sources, inflow, outflow, system,
-                   substrates, law, scheme.modified_newton)
+                   substrates, law, scheme)
 
 
 def diffusion(space: Space, kind: Substrate) -> np.ndarray:
@@ -370,7 +366,7 @@ def both_ends(space: Space) -> np.ndarray:
 
 def supplied_everywhere(problem: Problem) -> Concentrations:
     """C = C_supply in the whole pore, the state at t = 0 (2.2)."""
-    return concentrations(problem.substrates, problem.supply.reshape(len(problem.both), -1))
+    return concentrations(problem.substrates, problem.supply.reshape(len(problem.kinds), -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -421,7 +417,7 @@ class Balance:
 
     def at(self, state: np.ndarray) -> np.ndarray:
         """(s, r, q) mg/L, concentrations at the points of the reaction; state: (sn,) mg/L."""
-        return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))
+        return self._reaction.evaluate(state.reshape(len(self.problem.kinds), -1))
 
     @property
     def _present_sink(self) -> Sink:
@@ -432,17 +428,17 @@ class Balance:
         return self.problem.rate_law
 
     @property
-    def _both(self) -> UptakeLaw:
+    def _uptake_law(self) -> UptakeLaw:
         """The law of uptake of the modelled substrates."""
-        return self._law.both
+        return self._law.uptake_law
 
     def uptake(self, state: np.ndarray) -> np.ndarray:
         """(r, s, q) um2 mg/L/h, uptake at concentrations (sn,) mg/L."""
-        return self._present_sink.uptake(self._both.fraction(self.at(state)), self._law)
+        return self._present_sink.uptake(self._uptake_law.fraction(self.at(state)), self._law)
 
     def unmet(self, state: np.ndarray) -> np.ndarray:
         """(2,) um2 mg/L/h, the unmet demand for acceptor and donor."""
-        return self._present_sink.unmet(self._both.fraction(self.at(state)), self._law)
+        return self._present_sink.unmet(self._uptake_law.fraction(self.at(state)), self._law)
 
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """(sn,) um2 mg/L/h, residual at concentrations (sn,) mg/L; loads: the uptake, if known."""
@@ -462,11 +458,11 @@ class Balance:
     def _slopes(self, state: np.ndarray, saturations: np.ndarray) -> np.ndarray:
         """(s, r, q) ds/dC at the saturations; zero where saturation and concentration are zero."""
         empty = (saturations <= 0) & (self.at(state) <= 0)
-        return np.where(empty, 0.0, self._both.saturation_slope(saturations))
+        return np.where(empty, 0.0, self._uptake_law.saturation_slope(saturations))
 
     def _uptake_slopes(self, saturations: np.ndarray) -> np.ndarray:
         """(s, s, r, q) derivatives of the uptake by the saturations."""
-        fractions, slopes = self._both.at_saturation(saturations)
+        fractions, slopes = self._uptake_law.at_saturation(saturations)
         return self._present_sink.slopes(fractions, self._law) * slopes
 
     def tangent(self, state: np.ndarray,
@@ -475,14 +471,14 @@ class Balance:
         if self.sink is None:
             return *self.problem.matrices, self._coupled(None)
         if saturations is None:
-            saturations = self._both.saturation(self.at(state))
+            saturations = self._uptake_law.saturation(self.at(state))
         by = self._uptake_slopes(saturations) * self._slopes(state, saturations)
         return *self.problem.matrices, self._coupled(by)
 
     def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
         """(r, sk, sk) um2/h of the uptake; slopes: (s, s, r, q), of uptake i by concentration j."""
         count, k = self._reaction.cells.shape
-        size = len(self.problem.both) * k
+        size = len(self.problem.kinds) * k
         if slopes is None:
             return np.zeros((count, size, size))
         blocks = self._reaction.mass(slopes)
@@ -490,9 +486,9 @@ class Balance:
 
     def begun(self, state: np.ndarray) -> Iterate:
         """The first iterate."""
-        saturations = np.zeros((len(self.problem.both), 1, 1))
+        saturations = np.zeros((len(self.problem.kinds), 1, 1))
         if self.sink is not None:
-            saturations = self._both.saturation(self.at(state))
+            saturations = self._uptake_law.saturation(self.at(state))
         return Iterate(state, saturations, self.residual(state), self.sizes(state),
                        self.problem.system.free)
 
@@ -511,7 +507,7 @@ class Balance:
             size = self.sizes(state) if fresh else iterate.size
             return replace(iterate, state=state, residual=self.residual(state), size=size)
         concentrations = self.at(state)
-        loads = self.sink.uptake(self._both.fraction(concentrations), self._law)
+        loads = self.sink.uptake(self._uptake_law.fraction(concentrations), self._law)
         size = self.sizes(state, loads) if fresh else iterate.size
         new = replace(iterate, state=state, residual=self.residual(state, loads), size=size)
         return self._resaturated(iterate, new, concentrations)
@@ -523,13 +519,13 @@ class Balance:
         about = iterate.saturations
         change = self._predicted(iterate, iterate.state) - about
         rise = np.einsum("ijrq,jrq->riq", self._uptake_slopes(about), change)
-        loads = self.sink.uptake(self._both.at_saturation(about)[0], self._law) + rise
+        loads = self.sink.uptake(self._uptake_law.at_saturation(about)[0], self._law) + rise
         return self.residual(iterate.state, loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
         """(s, r, q) saturations that the linearisation at ``iterate`` predicts for ``state``."""
         about = np.minimum(iterate.saturations, LARGEST_SATURATION)
-        change = self.at(state) - self._both.concentration(about)
+        change = self.at(state) - self._uptake_law.concentration(about)
         return about + self._slopes(iterate.state, about) * change
 
     def _resaturated(self, iterate: Iterate, new: Iterate, concentrations: np.ndarray) -> Iterate:
@@ -537,12 +533,12 @@ class Balance:
 
         concentrations: (s, r, q) mg/L of ``new`` at the points of the reaction.
         """
-        actual = self._both.saturation(concentrations)
+        actual = self._uptake_law.saturation(concentrations)
         if iterate.consistent and concentrations.min() > 0:
             return replace(new, saturations=actual)
         predicted = np.clip(self._predicted(iterate, new.state), 0.0, SATURATED)
         woken = (iterate.saturations <= 0) & (predicted <= 0) & (concentrations > 0)
-        rising = np.minimum(self._both.proportional(concentrations), SWITCH)
+        rising = np.minimum(self._uptake_law.proportional(concentrations), SWITCH)
         predicted = np.where(woken, rising, predicted)
         saturations = np.where((predicted > SWITCH) & (concentrations > 0), actual, predicted)
         consistent = bool((saturations == actual).all())
@@ -573,7 +569,7 @@ def steady(problem: Problem, sink: Sink | None,
         If the method does not converge.
     Unresolved
         If the mesh is too coarse for a front: a concentration is below zero by more than UNRESOLVED
-        of the supply, or above the supply by more than OVERSHOOT of the supply, or the uptake
+        of the supply, or above the supply by more than the scheme accepts, or the uptake
         depends on the quadrature.
 
     Notes
@@ -590,7 +586,7 @@ def steady(problem: Problem, sink: Sink | None,
     try:
         state, count = _newton(Balance(problem, sink), state)
     except TransportError:
-        if problem.law is not None and not problem.law.both.monotone:
+        if problem.law is not None and not problem.law.uptake_law.monotone:
             raise
         state, count = _eased(problem, sink, supply)
     solution = _checked(problem, state, count)
@@ -602,7 +598,7 @@ def steady(problem: Problem, sink: Sink | None,
 @failing_as(TransportError)
 def _newton(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     """(sn,) mg/L, the solution by Newton's method from ``state``, and the number of iterations."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.modified_newton)
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.scheme.modified_newton)
     try:
         last, count, converged = newton.solve(balance, balance.begun(state))
     except LinearError:
@@ -622,12 +618,13 @@ def _front(failure: str) -> Unresolved:
 def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
     """Newton's method with half saturations that decrease from the supply to their values."""
     law = problem.rate_law
-    supply = np.array([s.supply for s in problem.both])[:, None, None]
-    sharpest = law.both.sharpness(supply).min()
+    supply = np.array([s.supply for s in problem.kinds])[:, None, None]
+    sharpest = law.uptake_law.sharpness(supply).min()
+    full_newton = replace(problem.scheme, modified_newton=False)
     total = 0
     for factor in 10.0 ** np.arange(np.ceil(-np.log10(sharpest)), -1, -1):
-        softened = replace(law, both=law.both.softened(factor, supply))
-        eased = replace(problem, law=softened, modified_newton=False)
+        softened = replace(law, uptake_law=law.uptake_law.softened(factor, supply))
+        eased = replace(problem, law=softened, scheme=full_newton)
         state, iterations = _newton(Balance(eased, sink), state)
         total += iterations
     return state, total
@@ -635,11 +632,12 @@ def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.n
 
 def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrations:
     """The solution. Raises Unresolved if it is not in the range from zero to the supply."""
-    fields = state.reshape(len(problem.both), -1)
+    fields = state.reshape(len(problem.kinds), -1)
     for field, (name, substrate) in zip(fields, problem.substrates.modelled.items()):
         if field.min() < -UNRESOLVED * substrate.supply:
             raise _outside(problem, name, field, int(field.argmin()), substrate)
-        if field.max() / HIGHEST[problem.space.order] > substrate.supply:
+        overshoot = problem.scheme.overshoot
+        if overshoot is not None and field.max() / (1 + overshoot) > substrate.supply:
             raise _outside(problem, name, field, int(field.argmax()), substrate)
     return concentrations(problem.substrates, fields, iterations)
 
@@ -719,21 +717,21 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
     Supplied and out are fluxes through the ends, consumed is the uptake at ``state``.
     """
     space = problem.space
-    both = state.fields
-    out = both @ problem.outflow
-    consumed = np.zeros(len(both))
+    fields = state.fields
+    out = fields @ problem.outflow
+    consumed = np.zeros(len(fields))
     rows = np.zeros((2, 6))
     sink = _acting(problem, sink)
     if sink is not None:
         balance = Balance(problem, sink)
-        consumed = balance.uptake(both.ravel()).sum(axis=(0, 2))
-        rows[:, 5] = balance.unmet(both.ravel())
-    supplied = problem.source.reshape(len(both), -1).sum(axis=1)
+        consumed = balance.uptake(fields.ravel()).sum(axis=(0, 2))
+        rows[:, 5] = balance.unmet(fields.ravel())
+    supplied = problem.source.reshape(len(fields), -1).sum(axis=1)
     if problem.system.constrained.any():
-        through = (problem.operator @ both.ravel()).reshape(len(both), -1)
+        through = (problem.operator @ fields.ravel()).reshape(len(fields), -1)
         supplied = through[:, both_ends(space)].sum(axis=1)
-    enters = _end_means(space.inlet, both, problem.inflow)
-    leaves = _end_means(space.outlet, both, problem.outflow)
+    enters = _end_means(space.inlet, fields, problem.inflow)
+    leaves = _end_means(space.outlet, fields, problem.outflow)
     rows[problem.substrates.places, :5] = np.column_stack([supplied, out, consumed, enters, leaves])
     acceptor, donor = rows.tolist()
     return Fluxes(*acceptor), Fluxes(*donor)
@@ -745,8 +743,8 @@ def _acting(problem: Problem, sink: Sink | None) -> Sink | None:
     return sink if acts else None
 
 
-def _end_means(end: End, both: np.ndarray, load: np.ndarray) -> np.ndarray:
+def _end_means(end: End, fields: np.ndarray, load: np.ndarray) -> np.ndarray:
     """(s,) mg/L, means over an end, weighted with the flow if there is any."""
     if not load.any():
         load = end.assembled(np.ones(end.count))
-    return both @ load / load.sum()
+    return fields @ load / load.sum()

@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from repro.model.solving import Solved
     from repro.model.transport import Concentrations, Flows, Problem
 
-#: Relative tolerance of the concentrations in Gear's method. The largest error of m(C) is this
-#: times the change of m for a change of C by the supply.
-CONCENTRATION_TOLERANCE = 1e-3
-
 
 class QuasiSteady:
     """Quasi-steady substrates, with Heun's method for the biomass."""
@@ -42,7 +38,7 @@ class QuasiSteady:
         constant biomass then leads from the guess to one of them.
         """
         from repro.model import transport  # a scene without [substrates] does not load it
-        if problem.law is not None and not problem.law.both.monotone:
+        if problem.law is not None and not problem.law.uptake_law.monotone:
             guess = Gear().settled(problem, sink, guess)
         return transport.steady(problem, sink, guess)
 
@@ -100,11 +96,13 @@ class Gear:
     def growth_error(self, part: float, biomass: float, turnover: float, steepness: float) -> float:
         """Bound of the error due to separate integrations of growth and uptake.
 
-        Where a substrate is exhausted, m(C) errs by at most CONCENTRATION_TOLERANCE supply / K. The
-        bound is this part, or CONCENTRATION_TOLERANCE if larger, of the turnover at the fastest
-        rate. Away from exhaustion the largest measured error is 4e-4.
+        The concentrations err by at most ``gear.TOLERANCE`` of the supply. Where a substrate is
+        exhausted, m(C) errs by this times supply / K. The bound is this part, or the tolerance if
+        larger, of the turnover at the fastest rate. Away from exhaustion the largest measured error
+        is 4e-4.
         """
-        return CONCENTRATION_TOLERANCE * max(1.0, steepness) * part * biomass
+        from repro.model import gear
+        return gear.TOLERANCE * max(1.0, steepness) * part * biomass
 
 
 TransportInTime: TypeAlias = QuasiSteady | Gear

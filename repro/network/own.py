@@ -122,8 +122,8 @@ def _refuse(scene: Scene) -> None:
     if kinds:
         rates = rate_law(scene.substrates, scene.kinetics)
         needs["an uptake that rises with both concentrations and has no front, and no decay "
-              "without acceptor"] = rates.both.monotone and not (
-                  rates.both.sharp or rates.further_decay)
+              "without acceptor"] = rates.uptake_law.monotone and not (
+                  rates.uptake_law.sharp or rates.further_decay)
     for need, suits in needs.items():
         if not suits:
             raise SceneError(f"{scene.name}: the laws for networks need {need}")

@@ -117,7 +117,7 @@ def uptakes(scene: Scene) -> Iterator[Uptake]:
     """Uptake of the modelled substrates, (7)-(8)."""
     kinds = scene.substrates.modelled
     rates = rate_law(scene.substrates, scene.kinetics)
-    laws = dict(zip(kinds, rates.both))
+    laws = dict(zip(kinds, rates.uptake_law))
     largest = {name: laws[name].largest(kind.supply) for name, kind in kinds.items()}
     per_fraction = {"acceptor": rates.per_acceptor(largest.get("donor", 1.0)),
                     "donor": rates.per_donor(largest.get("acceptor", 1.0))}

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from repro.fem.outline import ON_ARC, parabola, polygon_area
+from repro.fem.elements import ON_ARC
+from repro.fem.outline import parabola, polygon_area
 
 if TYPE_CHECKING:
     from shapely import Polygon

@@ -8,6 +8,16 @@ CURVED = Scheme(
     # A term in J - theta stabilises growth (growth.GradDiv). A contact line may lie anywhere on an
     # edge.
     elements="quadratic",
+    # Elements are refined at boundary layers and fronts.
+    follows_layers=True,
+    # Edges at the tips of an outline have the length W / (5000 refinement^2), W / 200 in the preset
+    # fast.
+    edges_at_tips=5000.0,
+    # A step of Gear's method may end below zero by as much of the supply as profiles at rest
+    # (transport.UNRESOLVED).
+    undershoot=1e-3,
+    # A concentration above its supply by more than 2 % is not resolved.
+    overshoot=0.02,
     # The midpoint rule, with steps as long as numerics.tolerance allows (march.stepping).
     steps="midpoint",
     # w = u - grad psi carries the substrates, not u.

@@ -9,6 +9,14 @@ PAPER = Scheme(
     # Uptake is lumped at the nodes (3.3, space.Lumped). |grad P|^2 stabilises the pressure of
     # growth (3.4, growth.PressureGradient). Contact surfaces grow node by node (2.3.3).
     elements="linear",
+    # Elements follow no boundary layers or fronts (3.1).
+    follows_layers=False,
+    # Edges at the tips of an outline have the length W / (200 refinement^2).
+    edges_at_tips=200.0,
+    # The lumped reaction keeps the concentrations positive in every step of Gear's method (3.3).
+    undershoot=0.0,
+    # Concentrations may exceed the supply where the cell Peclet number is above 2.
+    overshoot=None,
     # Sequential coupling: flow, substrates, biomass and shape, every growth.time_step (section 2).
     steps="updates",
     # w = u - tau grad p carries the substrates, not u as printed.

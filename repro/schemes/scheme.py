@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 #: {choice: accepted words}.
 WORDS: dict[str, tuple[str, ...]] = {
@@ -30,7 +30,8 @@ class Scheme:
         They determine the spaces of velocity and pressure (:mod:`repro.model.flow`), the
         integration of uptake and growth (:mod:`repro.fem.space`), the stabilisation of growth
         (:mod:`repro.model.growth`) and the rule by which films close
-        (:data:`repro.model.contact.CLOSINGS`).
+        (:data:`repro.model.contact.CLOSINGS`). Another scheme with these elements has their values
+        of ``transfer`` and of the last four choices.
     steps : {"updates", "midpoint"}
         Shape updates every ``growth.time_step`` (section 2), or the midpoint rule with error
         control (:mod:`repro.march`).
@@ -45,6 +46,15 @@ class Scheme:
         triangles: the fraction of X_I is transferred, and the density becomes X_m.
     modified_newton : bool
         Does Newton's method keep its derivative as long as it converges fast?
+    follows_layers : bool
+        Are elements refined at boundary layers and fronts?
+    edges_at_tips : float
+        W over the length of the edges at the tips of an outline, at refinement 1. The length is
+        proportional to refinement^-2.
+    undershoot : float
+        Largest accepted concentration below zero in a step of Gear's method, over the supply.
+    overshoot : float or None
+        Largest accepted concentration above the supply, over the supply; None for no limit.
 
     Raises
     ------
@@ -66,6 +76,11 @@ class Scheme:
     modified_newton: bool
     carrier: str = "w"
     inlet: str = "local"
+    _: KW_ONLY
+    follows_layers: bool
+    edges_at_tips: float
+    undershoot: float
+    overshoot: float | None
 
     def __post_init__(self) -> None:
         for choice, words in WORDS.items():
@@ -77,12 +92,6 @@ class Scheme:
     def order(self) -> int:
         """1: linear functions on straight triangles; 2: quadratic ones on curved triangles."""
         return WORDS["elements"].index(self.elements) + 1
-
-    @property
-    def follows_layers(self) -> bool:
-        """Are elements refined at boundary layers and fronts? The paper's linear elements are not.
-        """
-        return self.order > 1
 
     @property
     def controls_error(self) -> bool:

@@ -138,7 +138,7 @@ def slab_front(preset: str) -> list:
     ratio = donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
     bound, origin = size**2 / 8 / (depth**2 / 2 + FILM * depth * 0.8), FRONT
-    problem = transport.problem(space, None, scene.substrates, scene.kinetics)
+    problem = transport.problem(space, None, scene.substrates, scene.kinetics, scene.numerics.scheme)
     active = Sink(sink / scene.kinetics.maximum_utilization_rate * space.reaction.dx)
     state = transport.steady(problem, active)
     parameters = (donor.supply, sink, HALF, donor.diffusivity_in_aggregate, FILM, donor.diffusivity)

@@ -69,6 +69,7 @@ from verification.problems.channels import (
     substrates_with,
     uniform_masses,
 )
+from verification.problems.schemes import scheme_on
 
 LINEAR, QUADRATIC = {"linear": 1}, {"quadratic": 2}
 PECLETS = {f"Pe = {peclet:g}": peclet for peclet in (0.1, 1.0, 5.0)}
@@ -273,7 +274,8 @@ def _rest_state(cell: float, number: int, density: float, shape: str, order: int
         space = meshes.space_on(straight, order)
     else:
         space = meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
-    arguments = transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(uniform_masses(space, density))
+    problem = transport.problem(space, None, SUBSTRATES, SCENE.kinetics, scheme_on(space))
+    arguments = problem, Sink(uniform_masses(space, density))
     return space, both(transport.steady(*arguments) if order == 1 else gear.settle(*arguments, None))
 
 
@@ -475,7 +477,8 @@ def _mixed(step: float, order: int) -> np.ndarray:
 
     step: h.
     """
-    equations = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
+    space = box_around(order)
+    equations = transport.problem(space, None, CLOSED, SLOW_LAW, scheme_on(space))
     weight = equations.space.reaction.dx
     active = SEEDED * weight
     inert = 0 * active

@@ -26,7 +26,7 @@ from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import Check, Study, at_least, at_most, each_at_most, study
 from verification.problems import runs
 from verification.problems.channels import NAMES, ORDERS, SCENE, both, rates, substrates_with
-from verification.problems.schemes import Change, exchange, load_scene
+from verification.problems.schemes import Change, exchange, load_scene, scheme_on
 
 SLOW = 0.35e6 / 24
 #: Radius (um) and supplies of acceptor and donor (mg/L) of pores at 0.35 m/d whose biomass could take up far more.
@@ -332,7 +332,7 @@ def _open(numerics: int | str) -> transport.Problem:
         space = box_around(numerics)
     else:
         space = seeded(_half_disc(50.0, 20.0, "2.9 m/day", numerics)).space
-    return transport.problem(space, None, OPEN, SCENE.kinetics)
+    return transport.problem(space, None, OPEN, SCENE.kinetics, scheme_on(space))
 
 
 @pytest.mark.case(

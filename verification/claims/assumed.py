@@ -28,7 +28,7 @@ from verification.claims import (
 from verification.claims.fluid_and_aggregate import STATES, with_fluid_forces
 from verification.claims.growth_pattern import biomass_rates, halves
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, CONVERGED, PAIRED, Level, at_level
-from verification.claims.permeability import LENGTHS, at_length, clean, decay_share
+from verification.claims.permeability import LENGTHS, at_length, clean_per_day, decay_share
 from verification.claims.runs import (
     BASE,
     END,
@@ -192,7 +192,7 @@ def conductivity_ratio_at(run: Run, part: float) -> float:
     """K / K_clean of a run when the thickness of its aggregate is a part of the pore's width."""
     scene, rows = load_packaged(*run), series(*run)
     thickness = rows["thickness_um"] / scene.pore.width
-    return float(np.interp(part, thickness, rows["conductivity_m_per_d"])) / (24e-6 * clean(scene))
+    return float(np.interp(part, thickness, rows["conductivity_m_per_d"])) / clean_per_day(scene)
 
 
 @claim("C65", "1", "at high values of the normalized surface loading a biofilm tends to be continuous, at low values "

@@ -23,7 +23,7 @@ from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, claim
 from verification.claims.base_run import DISTANCES, upstream_means
 from verification.claims.levels import ABOUT_WIDE, PAIRED
-from verification.claims.permeability import CLOSING, LENGTHS, at_length, clean, layered_share
+from verification.claims.permeability import CLOSING, LENGTHS, at_length, clean_per_day, layered_share
 from verification.claims.runs import (
     BASE,
     PLOTTED,
@@ -74,7 +74,7 @@ def filled_at(reduced: float, run: Run = WIDE, lengths: float | None = None) -> 
     the pore over its width, by default the run's own."""
     scene, rows = load_packaged(*run), series(*run)
     lengths = lengths or scene.pore.length / scene.pore.width
-    share = at_length(rows["conductivity_m_per_d"] / (24e-6 * clean(scene)), scene, lengths)
+    share = at_length(rows["conductivity_m_per_d"] / clean_per_day(scene), scene, lengths)
     area = np.exp(np.interp(-np.log(reduced), -np.log(share), np.log(rows["aggregate_area_um2"])))
     return float(area) / (scene.pore.width**2 * lengths)
 
@@ -277,7 +277,7 @@ def deviation_over_bound(run: tuple[str, ...], spanned: bool) -> np.ndarray:
     low, high = share_range(spanned)
     share = rows["aggregate_area_um2"] / width**2
     in_range = (rows["contact"] == spanned) & (share >= max(low, LEAST)) & (share <= high)
-    added = 24e-6 * clean(scene) / rows["conductivity_m_per_d"][in_range] - 1
+    added = clean_per_day(scene) / rows["conductivity_m_per_d"][in_range] - 1
     law, least, largest = np.log(added_resistance(share[in_range], 1.0, spanned, scene.flow.viscosity_ratio))
     deviation = np.log(added * scene.pore.length / width) - law
     return deviation / np.where(deviation < 0, law - least, largest - law)

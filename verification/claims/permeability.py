@@ -40,6 +40,11 @@ def clean(scene) -> float:
     return scene.flow.gravity * scene.pore.width**2 / (12 * scene.flow.kinematic_viscosity)
 
 
+def clean_per_day(scene) -> float:
+    """:func:`clean` in m/day."""
+    return 24e-6 * clean(scene)
+
+
 def layered_share(ratio: float, part: float, walls: int) -> float:
     """K / K_clean of a channel of which layers fill a part: Poiseuille's gradient over that of parallel flow at the
     same mean velocity."""
@@ -67,8 +72,7 @@ def spanning() -> Finding:
     """Conductivity of `wide` against its biomass up to contact. At contact it is that of the first shape in which a
     film has closed. A film closes by entire edges of the outline, so the error is of first order in their length:
     several percent."""
-    clean_conductivity = 24e-6 * clean(load_packaged(*WIDE))
-    film, closed = (float(value) / clean_conductivity for value in around_contact(*WIDE)["conductivity_m_per_d"])
+    film, closed = (around_contact(*WIDE)["conductivity_m_per_d"] / clean_per_day(load_packaged(*WIDE))).tolist()
     checks = (at_most("K / K_clean at contact", SHARPLY, closed, 0.01, "orders of magnitude: two at least"),
               *slopes(WIDE, "wide"),
               at_least("fall as the last film closes (times)", "when the aggregate spans the pore", film / closed, 10.0,
@@ -118,7 +122,7 @@ def at_length(share: float, scene: Scene, lengths: float) -> float:
 def _in_long_pores(run: Run) -> str:
     """Describe how the fall depends on the length of the pore."""
     scene = load_packaged(*run)
-    closed = float(around_contact(*run)["conductivity_m_per_d"][1]) / (24e-6 * clean(scene))
+    closed = float(around_contact(*run)["conductivity_m_per_d"][1]) / clean_per_day(scene)
     rows = ", ".join(f"{at_length(closed, scene, lengths):.2g} and {steepness(run, lengths):.3g} against "
                      f"{layer_slope(run, lengths):.3g} at {lengths:g} W" for lengths in LENGTHS)
     return f"K / K_clean at contact, and the slope against that of a uniform layer, in pores of other lengths: {rows}."
@@ -150,7 +154,7 @@ def _approach(run: Run, lengths: float | None = None) -> tuple[np.ndarray, np.nd
     area, share = (approach(*run)[key] for key in ("aggregate_area_um2", "conductivity_m_per_d"))
     if lengths is not None:
         scene = load_packaged(*run)
-        share = at_length(share / (24e-6 * clean(scene)), scene, lengths)
+        share = at_length(share / clean_per_day(scene), scene, lengths)
     return area, share
 
 

@@ -2,6 +2,7 @@
 
 from verification.mutants import changes
 
+NODES = "tests/test_mesh.py::test_ends_and_walls_have_the_nodes_that_lie_on_them"
 GRADIENTS = "tests/test_mesh.py::test_products_of_two_gradients_are_integrated"
 PERMEABLE = "tests/test_flow.py::"
 
@@ -77,8 +78,8 @@ MUTANTS = (
         ("flow-one-pressure",
          "Fluid and biomass share the pressures of the interface.",
          "unit_flow",
-         "splits = velocity.order > 1 and resistance.pressure_jumps",
-         "splits = False and resistance.pressure_jumps"),
+         "splits = kind.splits(resistance)",
+         "splits = False"),
         ("inlet-not-scaled",
          "The parabola at the inlet of linear triangles is cut by its chords and brings too little flux.",
          "Linear.prescribed",
@@ -208,15 +209,49 @@ MUTANTS = (
         ("quadrature-of-degree-2",
          "Products of quadratic functions are integrated by a rule of degree 2.",
          "",
-         "Element(ElementTriP2(), degree=6, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
-         "Element(ElementTriP2(), degree=2, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
+         "Curved(ElementTriP2(), degree=6, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
+         "Curved(ElementTriP2(), degree=2, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
          "tests/test_mesh.py::test_products_of_two_functions_are_integrated_exactly[straight sides]"),
         ("quadrature-of-straight-triangles",
          "Products of quadratic functions are integrated beside arcs as on straight triangles.",
          "",
-         "Element(ElementTriP2(), degree=6, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
-         "Element(ElementTriP2(), degree=4, gradient_degree=6, on_edge=(0, 3, 1), edge_weights=(1 / 6, 4 / 6, 1 / 6))",
+         "Curved(ElementTriP2(), degree=6, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
+         "Curved(ElementTriP2(), degree=4, gradient_degree=6, sides=((0, 3, 1), (1, 4, 2), (2, 5, 0)), "
+         "edge_weights=(1 / 6, 4 / 6, 1 / 6), lines=ON_ARC)",
          "tests/test_mesh.py::test_products_of_two_functions_are_integrated_exactly[made]")),
+    *changes(
+        "repro/fem/mesh.py",
+        ("ends-in-the-order-of-triangles",
+         "The edges of an end are in the order of the triangles, not from wall to wall.",
+         "Topology._edges_of",
+         "forward[np.argsort(np.minimum(start, end))]",
+         "forward",
+         f"{NODES}[3-1]"),
+        ("middle-between-the-walls",
+         "The middle of an edge that joins both walls counts as a node of a wall.",
+         "Topology._inside_edges_on_walls",
+         "nodes[np.bincount(inside.ravel(), minlength=1 + nodes.max(initial=0))[nodes] == 1]",
+         "nodes",
+         f"{NODES}[1-2]")),
+    *changes(
+        "repro/fem/sizing.py",
+        ("arc-as-a-circle",
+         "A node that splits an arc has its origin on the seed's circle, not on the arc.",
+         "placed",
+         "np.where(straight, seed + _on_arc(origin - seed, a - seed, b - seed), origin)",
+         "seed + _on_arc(origin - seed, a - seed, b - seed)",
+         "tests/test_sizing.py::test_a_new_node_of_a_seed_has_its_material_on_the_seeds_arc[2]")),
+    *changes(
+        "repro/fem/outline.py",
+        ("fixed-beside-the-corner",
+         "On arcs the node after a fixed point is fixed too.",
+         "_with_nodes",
+         "(fixed[:, None] & ~inside).ravel()",
+         "np.repeat(fixed, element.parts)",
+         "tests/test_sizing.py::test_a_drawn_aggregate_has_one_fixed_node_on_each_wall[2]")),
     *changes(
         "repro/fem/space.py",
         ("gradients-of-degree-2",

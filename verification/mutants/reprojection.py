@@ -101,8 +101,8 @@ MUTANTS = (
         ("origin-on-the-chord",
          "A node that splits an edge of the seed's arc is put on the chord at t = 0.",
          "placed",
-         "origin = seed + _on_arc(origin - seed, ends[:, 0] - seed, ends[:, 2] - seed)",
-         "origin = 1.0 * origin")),
+         "np.where(straight, seed + _on_arc(origin - seed, a - seed, b - seed), origin)",
+         "1.0 * origin")),
     *changes(
         "repro/fem/mesh.py",
         ("remeshed-too-late",

@@ -88,7 +88,7 @@ MUTANTS = (
         ("unpaired",
          "below zero each substrate is taken up on its own, so that the two are not in proportion",
          "Balance.uptake",
-         "return self._present_sink.uptake(self._both.fraction(self.at(state)), self._law)",
+         "return self._present_sink.uptake(self._uptake_law.fraction(self.at(state)), self._law)",
          "rates = [self._law.own_uptake(s, *self.at(state))[0] for s in (0, 1)]\n"
          "return self.sink.active[:, None] * np.stack(rates, axis=1)")),
     *changes(

@@ -26,6 +26,7 @@ from repro.model.kinetics import Sink
 from repro.model.transport_in_time import QuasiSteady
 from repro.scene import load_scene
 from verification.problems import meshes
+from verification.problems.schemes import scheme_on
 
 SCENE = load_scene("base")
 WIDTH, SLAB = 10.0, 40.0
@@ -79,7 +80,7 @@ def prescribed_flow(space: Space, velocity: np.ndarray, mean: float) -> flow.Flo
 def problem(space: Space, speed: float | None, substrates=SCENE.substrates, law=SCENE.kinetics) -> transport.Problem:
     """Both substrates under plug flow at a uniform velocity (um/h). Without flow if it is None."""
     carried = None if speed is None else prescribed_flow(space, np.tile([speed, 0.0], (space.count, 1)), speed)
-    return transport.problem(space, carried, substrates, law)
+    return transport.problem(space, carried, substrates, law, scheme_on(space))
 
 
 def uniform_masses(space: Space, density: float) -> np.ndarray:

@@ -41,7 +41,7 @@ LENIENT = "paper"
 TOLERANCE = {"paper": 0.04, "fast": 0.01, "accurate": 0.001}
 PROMISED = {"paper": "linear triangles: 1 to 4 % in the head loss",
             "fast": "what fast is for: 1 %", "accurate": "what accurate is for: 0.1 %"}
-#: Bounds of concentrations over the supply that the stages document (UNRESOLVED, OVERSHOOT).
+#: Bounds of concentrations over the supply that the stages document (UNRESOLVED, Scheme.overshoot).
 LOWEST, HIGHEST = -1e-3, 1.02
 BALANCE = 1e-9
 NEWTON = "Newton's tolerance of 1e-12 a row, times the rows, a thousand at least, over Peclet's number where under one"
@@ -232,7 +232,7 @@ def _bounds(run: Run) -> Iterator[Check]:
                        "transport.UNRESOLVED")
         if supply:
             yield at_most(f"{name}'s largest over its supply", max(f.max() for f in fields) / supply, HIGHEST,
-                          "transport.OVERSHOOT")
+                          "Scheme.overshoot")
 
 
 def _biomass(run: Run) -> Iterator[Check]:

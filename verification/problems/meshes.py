@@ -259,7 +259,7 @@ def along_edges(order: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
     points, weights = np.polynomial.legendre.leggauss(count)
     along = (points + 1) / 2
     functions = elements.values(order, np.column_stack([along, 0 * along]))
-    return along, weights / 2, functions[:, elements.ELEMENTS[order].on_edge]
+    return along, weights / 2, functions[:, elements.ELEMENTS[order].sides[0]]
 
 
 def mean_size(mesh: Mesh, chosen=slice(None)) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from repro.fem.space import Space
 from repro.scene import Scene, Source, load_tables
 from repro.scene import load_scene as load_plain
 from repro.scene.keys import SCHEMES
@@ -10,6 +11,8 @@ from repro.schemes import CURVED, PAPER, Scheme
 
 #: The scheme that has elements.
 WITH_ELEMENTS = {"linear": PAPER, "quadratic": CURVED}
+#: Choices that do not belong to the elements.
+FREE = ("steps", "carrier", "inlet", "modified_newton")
 
 
 @dataclass(frozen=True)
@@ -19,11 +22,17 @@ class Exchange:
     choices: tuple[tuple[str, object], ...]
 
     def on(self, scheme: Scheme) -> Scheme:
-        """The scheme with these choices. With other elements it has their transfer."""
+        """The scheme with these choices. With other elements it has what belongs to them."""
         choices = dict(self.choices)
         if choices.get("elements", scheme.elements) != scheme.elements:
-            choices = {"transfer": WITH_ELEMENTS[choices["elements"]].transfer, **choices}
+            choices = {**{name: getattr(scheme, name) for name in FREE}, **choices}
+            scheme = WITH_ELEMENTS[choices["elements"]]
         return replace(scheme, **choices)
+
+
+def scheme_on(space: Space) -> Scheme:
+    """The scheme with the elements of a space."""
+    return PAPER if space.order == 1 else CURVED
 
 
 #: A change of a scene: KEY=VALUE, or choices of its scheme.

@@ -142,9 +142,9 @@ def of_base(scene: Scene) -> Row:
     grown, _, _ = Stages.of(scene).transport.make_biomass(shaped.pore, shaped.solved,
                                                             scene.growth.time_step)
     solved = solving.solve(scene, grown)
-    halves = [substrate.half_saturation for substrate in solved.problem.both]
+    halves = [substrate.half_saturation for substrate in solved.problem.kinds]
     acceptor, donor = (flux.effluent / half for flux, half in zip(solved.fluxes, halves))
-    supply = [substrate.supply for substrate in solved.problem.both]
+    supply = [substrate.supply for substrate in solved.problem.kinds]
     rate = float(rate_law(scene.substrates, scene.kinetics).growth_rate(*supply))
     return {"velocity_0": M_PER_D * first.solved.flow.mean_velocity,
             "velocity": M_PER_D * shaped.solved.flow.mean_velocity,

@@ -6,15 +6,15 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
      "dominant = np.tile((np.ones((k, k)) + k - np.eye(k)).ravel(), len(elements))"):
         "Identical orders of elimination for every system of base in the three presets. The order follows from the "
         "pattern of the entries. Their values only prevent a zero pivot of a factorisation that is not used further.",
-    ("fem/transfer.py", "return np.where(lost[:, None], 99.0, local)",
+    ("fem/elements.py", "return np.where(lost[:, None], 99.0, local)",
      "return np.where(lost[:, None], 100.0, local)"):
         "Both values lie outside of every triangle (the search ends between -2 and 3), and both move to the same point "
         "of its edge.",
     ("model/gear.py", "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 4))",
      "still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros(( 1, 4))"):
         "NumPy broadcasts one row of zeros to two rows of zeros.",
-    ("model/transport.py", "return self._reaction.evaluate(state.reshape(len(self.problem.both), -1))",
-     "return self._reaction.evaluate(state.reshape(len(self.problem.both), - 2))"):
+    ("model/transport.py", "return self._reaction.evaluate(state.reshape(len(self.problem.kinds), -1))",
+     "return self._reaction.evaluate(state.reshape(len(self.problem.kinds), - 2))"):
         "NumPy infers the length of an axis from any negative number.",
     ("model/growth.py", "MOST_ITERATIONS = 25", "MOST_ITERATIONS = 24"):
         "Identical outputs of base in the three presets, whose equilibria take at most 5, 5 and 3 iterations.",
