@@ -79,8 +79,8 @@ class ByLines(Closing):
         _place_lines(grown.boundary, lines, self._advances)
         gaps = inf, inf
         shape = None
-        settles = not (grown.body.spans and self._advances)
-        if not settles and not search.stationary:
+        predicted = grown.body.spans and bool(self._advances)
+        if predicted and not search.stationary:
             shape = self.settle(wall, lines)
         if shape is None:
             shape = self.solve(wall, lines)
@@ -90,16 +90,14 @@ class ByLines(Closing):
                 search.refuse_late(gaps, film)
                 wall, lines, shape = self._touch(shape)
             if not search.stationary:
-                shape = self._search(wall, lines, shape, settles)
+                settled = self.settle(wall, lines) if predicted else None
+                shape = settled or self._search(wall, lines, shape)
         rest = with_new_surfaces(shape.pore)
         return replace(shape, pore=rest, iterations=self.iterations, gaps=gaps)
 
-    def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion,
-                settles: bool) -> Expansion:
-        """Move lines until all are accepted, or until Newton's method solves for them.
-
-        settles: is Newton's method tried?
-        """
+    def _search(self, wall: np.ndarray, lines: Sequence[Line], shape: Expansion) -> Expansion:
+        """Move lines until all are accepted, or until Newton's method solves for them."""
+        settles = True
         for _ in range(CONTACT_ROUNDS):
             outline = shape.pore.boundary
             for line in lines:
