@@ -300,8 +300,22 @@ class Welding:
         lengths = welds.lengths_from(outlines[0], walks[0])
         joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
         pairs = np.column_stack([self._loops[side][walk] for side, walk in zip(sides, walks)])
+        pairs = pairs[: self._before_valley(mesh.points[pairs]) + 1]
         return Notch(weld, sides, pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
                      np.tan(keys.minimum_contact_angle), new, joined)
+
+    def _before_valley(self, nodes: np.ndarray) -> int:
+        """Index of the last pair of corners that may join; nodes: (k, 2, 2) um, opposite pairs.
+
+        A film behind thicker water does not close, because the water would be enclosed. It ends the
+        run instead (:mod:`repro.march.ends`), unless even the thicker water is a film that closes.
+        """
+        film = np.linalg.norm(nodes[:, 1] - nodes[:, 0], axis=1)
+        thicker = 1 + self.mechanics.numerics.tolerance
+        least = thicker * np.maximum(film, self.mechanics.keys.minimum_film)
+        behind = np.maximum.accumulate(film) > least
+        last = int(np.argmax(film[: np.argmax(behind)])) if behind.any() else len(film) - 1
+        return last - last % self.grown.mesh.geometry
 
     def equilibrium(self) -> Pore:
         """The equilibrium with the weld and the contact of ``start``."""
