@@ -428,6 +428,31 @@ def test_welded_aggregates_are_in_equilibrium_with_the_forces_of_the_water():
         assert np.abs(adhesion.wall_forces(loading, pore, solved)[off]).max() < bound * np.abs(water).max()
 
 
+@pytest.mark.parametrize("seeds", [(LOWER, UPPER), (UPPER, LOWER)], ids=["low first", "high first"])
+@pytest.mark.parametrize("failing, starts", [(1, ("pore", "pore", "rest")), (2, ("pore", "pore", "pore"))])
+def test_stresses_of_welded_aggregates_start_from_the_equilibrium_without_forces_if_newton_fails(
+        monkeypatch, seeds, failing, starts):
+    """As those of one aggregate (`test_detachment.py`), by the same function."""
+    report = last_of(*seeds, changes=("growth.fluid_forces=included",))
+    loading = adhesion.Loading.of(scene_of(*SCENE, "growth.fluid_forces=included"))
+    expected = [peak.value for peak in adhesion.wall_peaks(loading, report.pore, report.solved)]
+    equilibrium = welding.Welding.equilibrium
+    calls = []
+
+    def counted(group):
+        calls.append(("pore" if group.start is group.grown else "rest", group.forces is not None, group.patient))
+        if len(calls) <= failing:
+            raise GrowthError("stands")
+        return equilibrium(group)
+
+    monkeypatch.setattr(welding.Welding, "equilibrium", counted)
+    for cached in (adhesion.at_rest, adhesion.wall_peaks):
+        cached.cache_clear()
+    peaks = adhesion.wall_peaks(loading, report.pore, report.solved)
+    assert report.pore.welds and [peak.value for peak in peaks] == pytest.approx(expected, rel=1e-8)
+    assert calls == list(zip(starts, (True, False, True), (False, False, True)))
+
+
 def test_the_water_does_not_move_stiff_welded_aggregates():
     """A thousand times as stiff, they grow as without forces: mu_L alone has no effect then."""
     stiff = last_of(LOWER, UPPER, changes=("growth.fluid_forces=included", 'growth.shear_modulus="10 MPa"'))
