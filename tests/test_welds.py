@@ -163,7 +163,7 @@ def test_a_weld_does_not_advance_beyond_its_opposite_nodes():
     notch = welding.Notch(WELD, (0, 1), pairs, before, 2, 2.0, 0.3, False)
     notch.advance(before.reshape(-1, 2))
     assert (notch.joined, notch.first_enough) == (0, 0)
-    assert notch.step == 2
+    assert notch.step == 1.5
     closed = before * [1.0, 0.0]
     notch.advance(closed.reshape(-1, 2))
     assert notch.joined == 1
@@ -171,19 +171,49 @@ def test_a_weld_does_not_advance_beyond_its_opposite_nodes():
         notch.advance(closed.reshape(-1, 2))
 
 
-def test_the_first_trial_of_a_notch_joins_all_films_that_are_too_thin():
-    """Films close up to the third corner; then the search counts down by 1 and 2, and halves the interval."""
+def test_the_first_trial_of_a_notch_joins_all_films_but_one_that_are_too_thin():
+    """Films close up to the seventh pair of corners; then the search counts down by 1, 1 and 2, and halves the
+    interval."""
     x = np.linspace(0, 4, 41)
     half = np.where(x < 1.5, 0.0, x)
     after = np.stack([np.column_stack([x, -half]), np.column_stack([x, half])], axis=1)
     before = np.stack([np.column_stack([x, -x]), np.column_stack([x, x])], axis=1)
     notch = welding.Notch(WELD, (0, 1), np.arange(82).reshape(41, 2), before, 2, 2.0, 0.3, False)
     notch.predict(after.reshape(-1, 2))
-    assert notch.joined == 7
+    assert notch.joined == 6
     open_film = before.reshape(-1, 2)
-    for joined in (6, 4, 2, 1, 0, 0):
+    for joined in (5, 4, 2, 1, 0, 0):
         notch.advance(open_film)
         assert notch.joined == joined
+
+
+@pytest.mark.parametrize("seeds", [(LOWER, UPPER), (UPPER, LOWER)], ids=["low first", "high first"])
+def test_a_closing_computes_each_equilibrium_once_and_half_way_none_within_arcs(monkeypatch, seeds):
+    """Half way through a step a weld ends at a corner. At its end the trials of the last arc follow, on other
+    meshes."""
+    closings = []
+    equilibrium, close = welding.Welding._equilibrium, welding.Welding.close
+
+    def counted(closing, shape, tied, placed=None):
+        result = equilibrium(closing, shape, tied, placed)
+        if placed is None:
+            number = tuple(notch.joined for notch in closing._notches)
+            closings[-1][1].append((len(closing.grown.mesh.points), number))
+        return result
+
+    def closed(closing):
+        closings.append((closing.within_arcs, []))
+        return close(closing)
+
+    monkeypatch.setattr(welding.Welding, "_equilibrium", counted)
+    monkeypatch.setattr(welding.Welding, "close", closed)
+    changes = ['growth.end="0.8 h"', 'output.times=["0.8 h"]', f'pore.width="{WIDTH} um"']
+    list(repro.simulate(scene_of(*COMMON, *changes, f"aggregate=[{', '.join(seeds)}]")))
+    entire = [[trial for trial in trials if trial[0] == trials[0][0]] for _, trials in closings]
+    assert all(len(trials) == len(set(trials)) for trials in entire)
+    arcs = [len(trials) - len(whole) for (_, trials), whole in zip(closings, entire)]
+    half_way = [count for (within_arcs, _), count in zip(closings, arcs) if not within_arcs]
+    assert len(half_way) > 1 and not any(half_way) and max(arcs) >= 4
 
 
 # ---------------------------------------------------------------- runs
