@@ -47,7 +47,7 @@ def test_stresses_are_those_of_the_equilibrium_on_a_new_mesh(monkeypatch):
 
 def test_stresses_without_an_equilibrium_end_a_run_with_its_time(tmp_path, monkeypatch):
     """The equilibrium of a row's stresses may fail where that of the run does not."""
-    def none(*arguments):
+    def none(*arguments, **options):
         raise GrowthError("there is no equilibrium")
 
     monkeypatch.setattr(adhesion, "equilibrium", none)

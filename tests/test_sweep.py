@@ -391,6 +391,9 @@ ENDS = ["the aggregate reaches the pore's downstream end at t = 0 h",
         "the aggregate reaches the pore's upstream end at t = 1.5 h; it may happen earlier, after t = 1 h, since "
         "a shorter step fails: no rest",
         "aggregates left and 2 meet at t = 3.5 h: near x = 3, y = 20 um the film between them is 2 um",
+        "the aggregate's surface touches itself at t = 0.6 h: near x = 0, y = 15 um the film is 2 um",
+        "aggregates left and 2 touch in a second place at t = 0.5 h: near x = 3, y = 15 um the film is 2 um",
+        "aggregate 2 touches the wall y = 30 um at t = 0.5 h: near x = 3 um the film is 2 um",
         "aggregate left is eroded at t = 3 h: its thickness or contact is 2 um, below growth.minimum_film",
         "erosion takes a contact surface at y = 20 um in the step from t = 3 h",
         "the aggregates are steady at t = 30 h: their area, thickness and length change by at most 0.0009 per h"]

@@ -13,6 +13,7 @@ from math import inf
 
 import numpy as np
 import shapely
+from shapely.ops import substring
 
 from repro.errors import OutsidePore
 from repro.fem.brief import brief
@@ -105,6 +106,36 @@ class Outline:
         line = shapely.shortest_line(shapely.Polygon(self._ring), shapely.Polygon(other._ring))
         return float(line.length), shapely.get_coordinates(line).mean(axis=0)
 
+    def mouth(self, thick: float) -> tuple[float, np.ndarray]:
+        """The film of the surface with itself that separates water from the pore: its least
+        thickness (um), and its middle (2,) um. It is infinite if there is none.
+
+        thick: um. The film is thinner, and a circle of this diameter fits into the water behind it.
+        In a notch or a crease, films become thicker from the line on, so they separate no water.
+        """
+        ring = shapely.get_coordinates(self._ring)[:-1]
+        on_wall = np.flatnonzero(self.wall != FREE)[0]
+        ring = np.roll(ring, -on_wall * (len(ring) // len(self.points)), axis=0)
+        film, middle = inf, np.zeros(2)
+        if not _faces_itself(ring):
+            return film, middle
+        line = shapely.LineString(ring)
+        for pocket in shapely.Polygon(ring).buffer(thick / 2, quad_segs=ON_ARC).interiors:
+            if line.distance(shapely.Polygon(pocket).representative_point()) < thick / 2:
+                continue  # smaller than the error of the arcs
+            beside = shapely.line_locate_point(line, shapely.points(pocket.coords))
+            first, second = beside.min(), beside.max()
+            sides = [substring(line, 0.0, first), substring(line, second, line.length)]
+            points = [line.interpolate(first), line.interpolate(second)]
+            apart = inf
+            while (length := points[0].distance(points[1])) < apart:
+                apart = length
+                for k in (1, 0):  # to the point of this side that is nearest to the other side's
+                    points[k] = sides[k].interpolate(sides[k].project(points[1 - k]))
+            if apart < film:
+                film, middle = apart, shapely.get_coordinates(points).mean(axis=0)
+        return film, middle
+
     @cached_property
     def _ring(self) -> shapely.LinearRing:
         """The curve, with straight lines in place of an arc."""
@@ -195,6 +226,15 @@ class Outline:
         t = (-0.5 * along[arc, axis] / bend[arc, axis])[:, None]
         peaks = m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
         return np.concatenate([peaks, self.points])
+
+
+def _faces_itself(points: np.ndarray) -> bool:
+    """Does a line (K, 2), with the water on its right, turn to the right by more than half a turn?
+
+    Only then do two of its points face each other across water that is wider behind them.
+    """
+    turned = np.unwrap(np.arctan2(*np.diff(points, axis=0).T[::-1]))
+    return bool((np.maximum.accumulate(turned) - turned).max() > np.pi)
 
 
 def polygon_area(points: np.ndarray) -> float:

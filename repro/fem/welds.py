@@ -86,6 +86,12 @@ def united(outlines: Sequence[Outline],
     return [outline for outline, _ in left.values()], [nodes for _, nodes in left.values()]
 
 
+def around(outlines: Sequence[Outline]) -> Outline:
+    """The outline around an aggregate, or around all aggregates that are welded to each other."""
+    (outline,), _ = united(outlines, shared_points(outlines)[1])
+    return outline
+
+
 def _around(one: tuple[Outline, np.ndarray],
             other: tuple[Outline, np.ndarray]) -> tuple[Outline, np.ndarray]:
     """The outline around two welded ones, each with the indices (M,) of its points."""

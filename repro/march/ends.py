@@ -6,8 +6,8 @@ Each end is an event with a margin: zero at the event and positive after it.
     tearing       largest tensile stress / growth.tensile_strength - 1
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
-    meeting       1 - film / growth.minimum_film, for the film between two aggregates, or between a
-                  welded one and a wall that it does not touch
+    meeting       1 - film / growth.minimum_film, for the film between two aggregates, between a
+                  welded one and a wall that it does not touch, or between two parts of a surface
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the
@@ -44,6 +44,7 @@ from math import inf
 import numpy as np
 
 from repro.errors import RunEnd, StageError
+from repro.fem import welds
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.folding import Fold, fold_message, most_compressed
@@ -93,7 +94,8 @@ class Meeting(RunEnd):
 
     With ``growth.meeting = "weld"``, the default, two aggregates join instead, and the run
     continues, unless the weld would enclose water. Two aggregates on opposite walls enclose none.
-    Two on one wall enclose none if they meet at this wall. A run with a weld also ends if a welded
+    Two on one wall enclose none if they meet at this wall. A run also ends if a surface touches
+    itself so that water is enclosed, if welded aggregates touch in a second place, and if a welded
     aggregate reaches a further wall.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
@@ -309,18 +311,37 @@ def _eroded(least: float, pore: Pore) -> Iterator[Event]:
 
 
 def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
-    """The events of all pairs of aggregates."""
+    """The events of all pairs of aggregates, and of all surfaces that touch themselves."""
     least = ends.loading.growth.minimum_film
+    thicker = 1 + ends.loading.numerics.tolerance
     for pair, film, (x, y) in _films(pore):
-        thin = (1 + ends.loading.numerics.tolerance) * film
+        thin = thicker * film
         reason = ends.without_weld or _reason_against_weld(pore, pair, thin)
         end = Meeting(f"{_names(pore, pair)} meet at t = {pore.time:g} h: near x = {x:.4g}, "
-                      f"y = {y:.4g} um the film between them is {film:.3g} um, and it closes below "
-                      f"growth.minimum_film, {least:g} um; {reason}")
+                      f"y = {y:.4g} um the film between them is {_closes(film, least)}; {reason}")
         yield Event(1 - film / least, end, joins=None if reason else pair)
     for group in pore.groups:
+        yield from _mouths(least, thicker * least, pore, group)
         if len(group) > 1:
             yield from _further_contacts(least, pore, group)
+
+
+def _mouths(least: float, thick: float, pore: Pore, group: tuple[int, ...]) -> Iterator[Event]:
+    """The events of the films of a surface with itself that separate water from the pore.
+
+    least: um, growth.minimum_film; thick: um, slightly more: behind the film, thinner water than
+    this counts as a part of the film; group: indices of the aggregates with this surface.
+    """
+    outline = welds.around([pore.outlines[number] for number in group])
+    for diameter in (thick, 2 * thick):  # the second one finds a film before it is too thin
+        film, (x, y) = outline.mouth(diameter)
+        if film < inf:
+            surface = (f"{_names(pore, group)} touch in a second place" if len(group) > 1 else
+                       f"{pore.name_of(group[0])}'s surface touches itself")
+            end = Meeting(f"{surface} at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um "
+                          f"the film is {_closes(film, least)}; this would enclose water")
+            yield Event(1 - film / least, end)
+            return
 
 
 def _reason_against_weld(pore: Pore, pair: tuple[int, int], thin: float) -> str:
@@ -357,13 +378,13 @@ def _further_contacts(least: float, pore: Pore, group: tuple[int, ...]) -> Itera
         outline = pore.outlines[number]
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
+            others = _names(pore, tuple(other for other in group if other != number))
             reason = ("this would enclose water beside a weld"
                       if wall.number in pore.walls_of(group) else
                       "the model has no further contact of welded aggregates")
-            end = Meeting(f"{_names(pore, group)} meet at t = {pore.time:g} h: near x = {x:.4g} um "
-                          f"the film between aggregate {pore.bodies[number].name} and the wall "
-                          f"y = {wall.y:g} um is {film:.3g} um, and it closes below "
-                          f"growth.minimum_film, {least:g} um; {reason}")
+            end = Meeting(f"{pore.name_of(number)} touches the wall y = {wall.y:g} um at "
+                          f"t = {pore.time:g} h: near x = {x:.4g} um the film is "
+                          f"{_closes(film, least)}; it is welded to {others}, and {reason}")
             yield Event(1 - film / least, end)
 
 
@@ -376,9 +397,15 @@ def _films(pore: Pore) -> Iterator[tuple[tuple[int, int], float, np.ndarray]]:
             yield pair, *one.film(other)
 
 
+def _closes(film: float, least: float) -> str:
+    """The thickness of a film (um) and the least one (um), in messages."""
+    return f"{film:.3g} um, and it closes below growth.minimum_film, {least:g} um"
+
+
 def _names(pore: Pore, numbers: tuple[int, ...]) -> str:
     """Names of aggregates in messages."""
-    return "aggregates " + " and ".join(pore.bodies[number].name for number in numbers)
+    names = " and ".join(pore.bodies[number].name for number in numbers)
+    return f"aggregate{'s' * (len(numbers) > 1)} {names}"
 
 
 def _detachment(strength: Strength, pore: Pore, number: int, peak: Peak, verb: str, subject: str,

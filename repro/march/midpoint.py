@@ -186,12 +186,13 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
                   search: SearchOptions) -> Halfway:
     """Solve in the shape half way through a step of ``duration`` (h).
 
-    The rates at the start give this shape. If the moved mesh is not acceptable, a new mesh replaces
+    The rates at the start give this shape. Its welds end at corners, because only the rates of the
+    step follow from it. If the moved mesh is not acceptable, a new mesh replaces
     it. The masses are then carried to the points of the new mesh, and the rates back to the points
     of the mesh at the start.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
-    search = replace(search, advances=_last_advances(previous, 1, duration / 2))
+    search = replace(search, advances=_last_advances(previous, 1, duration / 2), within_arcs=False)
     expansion = stages.expand(previous, ahead, _scale_shape(previous, ahead), search)
     shape = expansion.pore
     mesh = remeshing.moved_mesh(stages.remeshing.meshing, previous, shape)

@@ -26,9 +26,10 @@ growth alone.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -210,30 +211,36 @@ def at_rest(loading: Loading, pore: Pore, solved: Solved) -> tuple[Pore, Solved]
         forces = fluid_forces(loading, rest, solved) / loading.growth.shear_modulus
         forces = rest.mesh.from_body(forces)
     for group in rest.groups:
-        if len(group) > 1:
-            from repro.model.welding import Welding  # a run without a weld does not load it
-            rest = Welding(mechanics, rest, rest, group, forces).equilibrium()
-        else:
-            seen = rest.focused(*group)
-            own = None if forces is None else forces[seen.region.nodes]
-            rest = _under_forces(mechanics, seen, own)
+        seen = rest.focused(group[0] if len(group) == 1 else None)
+        rest = _under_forces(partial(_equilibrium, mechanics, seen, group), seen, forces)
     return rest.focused(pore.focus), solved
 
 
-def _under_forces(mechanics: Mechanics, pore: Pore, forces: np.ndarray | None) -> Pore:
-    """Equilibrium of the aggregate in focus under nodal forces (n, 2), over mu_L.
+def _under_forces(solve: Callable[..., Pore], pore: Pore, forces: np.ndarray | None) -> Pore:
+    """Equilibrium of aggregates that move together under nodal forces (N, 2), over mu_L.
 
     A shape on a new mesh is not in equilibrium. If Newton's method fails to balance it under the
-    forces, it starts from the equilibrium without forces, if there is one.
+    forces, it starts from the equilibrium without forces, if there is one. solve: solve(start,
+    forces, patient) is their equilibrium.
     """
     start = pore
     if forces is not None:
         try:
-            return equilibrium(mechanics, pore, pore, forces, patient=False)[0]
+            return solve(pore, forces, patient=False)
         except GrowthError:
             with suppress(GrowthError):
-                start, _ = equilibrium(mechanics, pore, pore, None, patient=False)
-    return equilibrium(mechanics, pore, start, forces)[0]
+                start = solve(pore, None, patient=False)
+    return solve(start, forces, patient=True)
+
+
+def _equilibrium(mechanics: Mechanics, pore: Pore, group: tuple[int, ...], start: Pore,
+                 forces: np.ndarray | None, patient: bool) -> Pore:
+    """Equilibrium of the aggregates of a group: of one in focus, or of all that are welded."""
+    if len(group) > 1:
+        from repro.model.welding import Welding  # a run without a weld does not load it
+        return Welding(mechanics, pore, start, group, forces, patient=patient).equilibrium()
+    own = None if forces is None else forces[pore.region.nodes]
+    return equilibrium(mechanics, pore, start, own, patient=patient)[0]
 
 
 def wall_peak(loading: Loading, pore: Pore, solved: Solved) -> Peak:

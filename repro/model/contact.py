@@ -248,7 +248,8 @@ def _closed(mechanics: Mechanics, grown: Pore, start: Pore, group: tuple[int, ..
     number, *other = group
     if other:
         from repro.model.welding import Welding  # a run without a weld does not load it
-        return Welding(mechanics, grown, start, group, forces, patient=search.patient).close()
+        return Welding(mechanics, grown, start, group, forces, patient=search.patient,
+                       within_arcs=search.within_arcs).close()
     own = None if forces is None else forces[grown.mesh.regions[number].nodes]
     return CLOSINGS[grown.mesh.geometry](mechanics, grown.focused(number), start.focused(number),
                                          own, search).close()

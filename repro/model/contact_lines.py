@@ -78,7 +78,8 @@ class SearchOptions:
     least film; stationary: do lines stay at their first trial, and nodes on the walls of the
     start?; patient: is a failed equilibrium tried again in smaller parts?; advances: {(index of the
     aggregate, wall, direction): um along its outline}, first trial of each line; line_size: um,
-    size of the triangles beside the lines with the opposite wall, infinite to keep the mesh.
+    size of the triangles beside the lines with the opposite wall, infinite to keep the mesh;
+    within_arcs: do welds end within arcs?
     """
 
     landing: float = 0.0
@@ -86,6 +87,7 @@ class SearchOptions:
     patient: bool = True
     advances: Advances = field(default_factory=dict)
     line_size: float = inf
+    within_arcs: bool = True
 
     def refuse_late(self, gaps: tuple[float, float], film: float) -> None:
         """Raise FirstContact if the second gap is below ``landing`` times the least film.

@@ -22,7 +22,7 @@ from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
 from repro.model.body import Body
 from repro.model.meshing import Meshing
-from repro.model.pore import Pore
+from repro.model.pore import LARGEST_DEFECT, Pore
 from repro.model.solid import material
 from repro.model.transport import Concentrations, concentrations
 from repro.scene import Scene, Substrate, Substrates, at_time
@@ -110,7 +110,8 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
 
     The mesh moves with the material. Returns None if the contact differs or if the moved mesh is
     not acceptable. It may have as many poor triangles as the generated one: in an acute corner
-    of the water each mesh has some.
+    of the water each mesh has some. An arc that replaces several (:func:`welds.coarsened`) has
+    their area in the shape for which the mesh was generated alone.
     """
     shape, start = generated.shape, generated.pore
     old = expanded.mesh
@@ -125,7 +126,8 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
     if mesh is None:
         return None
     target = replace(start, space=Space(mesh))
-    return _transferred(rules, expanded, target, generated.at)[0]
+    pore, _ = _transferred(rules, expanded, target, generated.at)
+    return pore if abs(pore.mass - expanded.mass) <= LARGEST_DEFECT * expanded.mass else None
 
 
 def same_contact(pore: Pore, other: Pore) -> bool:

@@ -143,7 +143,7 @@ class Notch:
     new: bool
     joined: int = 0
     first_enough: float = inf
-    step: int = 1
+    step: float = 1.0
 
     def __post_init__(self) -> None:
         self.last_too_few = self.joined - 1
@@ -169,11 +169,11 @@ class Notch:
         else:
             self.last_too_few = self.joined
             if self.first_enough <= self.joined:  # the other notch has moved since
-                self.first_enough, self.step = inf, 1
+                self.first_enough, self.step = inf, 1.0
         if self.first_enough < inf:
             middle = int(self.last_too_few + self.first_enough + 1) // 2
-            self.joined = max(middle, int(self.first_enough) - self.step)
-            self.step *= 2
+            self.joined = max(middle, int(self.first_enough) - int(self.step))
+            self.step *= 1.5
         elif self.last_too_few < self._last:
             self.joined += 1
             self.predict(points)
@@ -181,9 +181,15 @@ class Notch:
             raise GrowthError("the weld advances beyond the nodes that are opposite each other")
 
     def predict(self, points: np.ndarray) -> None:
-        """Join pairs until no film is too thin in a given shape; points: (N, 2) um, of its mesh."""
-        while self.joined < self._last and self.too_thin(points, self.joined):
-            self.joined += 1
+        """Join all pairs but one until no film is too thin in a given shape.
+
+        points: (N, 2) um, of its mesh. Films open when pairs beside them join, so the last pair is
+        usually not needed.
+        """
+        joined = self.joined
+        while joined < self._last and self.too_thin(points, joined):
+            joined += 1
+        self.joined = max(joined - 1, self.joined)
 
     def too_thin(self, points: np.ndarray, joined: int) -> bool:
         """Is a film thinner than the rule requires? Close to the line the rule requires less, as in
@@ -251,7 +257,7 @@ class Welding:
     grown: the pore with its new theta, in the old shape; start: a pore on the same mesh with the
     shape and pressure from which the search starts; group: indices of the aggregates; forces:
     (N, 2) um at the nodes of the mesh, over mu_L, None for no forces; reach: um, by which a new
-    weld extends on each side of its node; patient: as in :class:`SearchOptions`.
+    weld extends on each side of its node; patient, within_arcs: as in :class:`SearchOptions`.
     """
 
     mechanics: Mechanics
@@ -261,6 +267,7 @@ class Welding:
     forces: np.ndarray | None = None
     reach: float = 0.0
     patient: bool = True
+    within_arcs: bool = True
 
     def __post_init__(self) -> None:
         self._iterations = 0
@@ -300,8 +307,22 @@ class Welding:
         lengths = welds.lengths_from(outlines[0], walks[0])
         joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
         pairs = np.column_stack([self._loops[side][walk] for side, walk in zip(sides, walks)])
+        pairs = pairs[: self._before_valley(mesh.points[pairs]) + 1]
         return Notch(weld, sides, pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
                      np.tan(keys.minimum_contact_angle), new, joined)
+
+    def _before_valley(self, nodes: np.ndarray) -> int:
+        """Index of the last pair of corners that may join; nodes: (k, 2, 2) um, opposite pairs.
+
+        A film behind thicker water does not close, because the water would be enclosed. It ends the
+        run instead (:mod:`repro.march.ends`), unless even the thicker water is a film that closes.
+        """
+        film = np.linalg.norm(nodes[:, 1] - nodes[:, 0], axis=1)
+        thicker = 1 + self.mechanics.numerics.tolerance
+        least = thicker * np.maximum(film, self.mechanics.keys.minimum_film)
+        behind = np.maximum.accumulate(film) > least
+        last = int(np.argmax(film[: np.argmax(behind)])) if behind.any() else len(film) - 1
+        return last - last % self.grown.mesh.geometry
 
     def equilibrium(self) -> Pore:
         """The equilibrium with the weld and the contact of ``start``."""
@@ -320,8 +341,11 @@ class Welding:
         tied = np.concatenate([np.empty((0, 2), int), *(notch.tied for notch in joined)])
         for notch in joined:
             notch.predict(shape.mesh.points)
+        known: dict[tuple[int, ...], Pore] = {}  # shapes of trials with the same walls
         for _ in range(CONTACT_ROUNDS):
-            shape = self._joined(shape, tied)
+            joins = tuple(notch.joined for notch in self._notches)
+            shape = known[joins] if joins in known else self._joined(shape, tied)
+            known[joins] = shape
             tied = self._tied()
             for notch in self._notches:
                 notch.advance(shape.mesh.points)
@@ -329,6 +353,8 @@ class Welding:
             at_rest = np.array_equal(self._tied(), tied)
             if at_rest and not any((wall != FREE).any() for wall in walls):
                 return self._within_arcs(shape)
+            if any((wall != FREE).any() for wall in walls):
+                known = {}
             for number, wall in zip(self.group, walls):
                 seen = shape.focused(number)
                 shape = seen.with_body(wall=np.where(wall != FREE, wall, seen.body.wall))
@@ -342,7 +368,7 @@ class Welding:
         """
         entire = Expansion(self._marked(shape), self._iterations)
         inside = [k for k, notch in enumerate(self._notches) if notch.joined and not notch.new]
-        if not inside:
+        if not (inside and self.within_arcs):
             return entire
         too_short = np.zeros(len(inside))
         enough = np.ones(len(inside))

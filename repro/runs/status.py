@@ -17,6 +17,9 @@ RUN_ENDS = (re.compile(f"{AGGREGATE} reaches the pore's (?:up|down)stream end "
             re.compile(f"{AGGREGATE} is eroded at {TIME}: .*"),
             re.compile(f"erosion takes a contact surface at y = .* um in the step from {TIME}"),
             re.compile(f"the aggregates are steady at {TIME}: .*"),
+            re.compile(f"{AGGREGATE}'s surface touches itself at {TIME}: near x = .*"),
+            re.compile(f"aggregates .* touch in a second place at {TIME}: near x = .*"),
+            re.compile(rf"{AGGREGATE} touches the wall y = \S+ um at {TIME}: near x = .*"),
             re.compile(rf"aggregates .* and \S+ meet (?:at|in the step from) {TIME}(?:: .*)?"))
 
 

@@ -52,7 +52,8 @@ LEAST = re.compile(r"um at t = (\S+) h;")
 ARRIVES, PORE_END = "end", "pore's end"
 FOLD = "fold"
 #: Words of the status of other ends, and their verdicts.
-OTHER_ENDS = {" meet at ": "meeting", " detaches at ": "detachment"}
+OTHER_ENDS = {**dict.fromkeys((" meet at ", " touches ", " touch in a second place at "), "meeting"),
+              " detaches at ": "detachment"}
 #: Verdicts that are errors.
 UNCONFIRMED, FAILED = "fold, not confirmed", "failed"
 
