@@ -91,7 +91,7 @@ SURFACES = {
     "a film that still closes": ([(1, 3), (4, 6), (8, 6), (10, 2.5), (14, 2.8)], (2.5, 10)),
     "a film that only becomes thicker": ([(1, 0.6), (4, 1.5), (8, 1.8), (10, 1.9), (14, 2.5)], None),
     "a shallow wave that closes as a whole": ([(1, 1.7), (4, 1.95), (8, 1.5), (12, 3)], None),
-    "a wave within the tolerance": ([(2, 1.99), (5, 2.004), (9, 1.99), (12, 5)], None),
+    "a wave within the tolerance": ([(2, 1.99), (5, 2.004), (6, 2.004), (9, 1.99), (12, 5)], None),
     "a crack": ([(3, 1.8), (3.1, 9), (3.2, 1.8), (8, 1.7), (12, 5)], None),
     "a crack over the contact": ([(-6, 5), (-6.5, 6), (0.5, 1.8), (8, 1.7), (12, 5)], None),
     "a thick film": ([(2, 5), (8, 9), (12, 4.5)], None),
