@@ -371,6 +371,34 @@ def test_a_surface_that_touches_itself_ends_the_run(wall, other, preset):
     assert 2 * (1 - 1e-4) <= film < 2.0 and abs(x) < 0.1
 
 
+#: Points (um) of two heads of 20 and 19.8 um, and of a bent aggregate with a lobe beyond its edge.
+HEADS = [(-22, 0), (-21, 12), (-17, 19.4), (-12, 20), (-7, 19.4), (-3, 12), (0, 8), (3, 12), (7, 19.2), (12, 19.8),
+         (17, 19.2), (21, 12), (22, 0)]
+HOOK = [(-14, 0), (-13, 12), (-8, 19.4), (0, 20), (13, 20), (19, 19.4), (22, 12), (21, 5), (16.5, 2.2), (12, 6),
+        (9, 11), (5, 9), (4, 0)]
+
+
+@pytest.mark.parametrize("points, place, touches, preset, wall, side", [
+    (HEADS, 12.0, 22.2, "fast", "lower", 1), (HEADS, 12.0, 22.2, "fast", "upper", -1),
+    (HEADS, 12.0, 22.2, "paper", "upper", 1), (HEADS, 12.0, 22.2, "paper", "lower", -1),
+    (HOOK, 16.5, 0.0, "fast", "upper", -1), (HOOK, 16.5, 0.0, "paper", "lower", 1)],
+    ids=["heads-fast-lower", "heads-fast-upper-mirrored", "heads-paper-upper", "heads-paper-lower-mirrored",
+         "hook-fast-upper-mirrored", "hook-paper-lower"])
+def test_an_aggregate_that_touches_a_wall_in_a_second_place_ends_the_run(points, place, touches, preset, wall, side):
+    """The opposite wall, or its own wall beyond its edge. Without this end, the contact surface jumps across the
+    valley, or Newton's method fails."""
+    seed = drawn([(side * x, y) for x, y in points[::side]], wall, 22.2, "bent")
+    reports, message = until_meeting('growth.end="2 h"', f"numerics.preset={preset}", 'pore.width="22.2 um"',
+                                     f"aggregate={seed}")
+    touches = touches if wall == "lower" else 22.2 - touches  # and the lobe there is drawn at ``place``, 8 um wide
+    found = re.match(rf"aggregate bent touches the wall y = (\S+) um in a second place at t = [01]\.\d+ h: near x = "
+                     rf"(\S+), y = (\S+) um {ENCLOSES}", message)
+    assert float(found[1]) == pytest.approx(touches) and float(found[2]) == pytest.approx(side * place, abs=2.0)
+    assert abs(float(found[3]) - touches) == pytest.approx(2.0, abs=0.01)
+    outline = reports[-1].pore.boundary
+    assert all(np.ptp(outline.points[outline.touches(number), 0]) < 45 for number in (1, 2)), "no valley is crossed"
+
+
 def mirrored_polygon(points, wall, geometry, smooth):
     """The outline through points (um) of the lower wall of a pore of 60 um, or their mirror image on the upper one."""
     walls = channel_walls(60.0)

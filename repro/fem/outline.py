@@ -17,7 +17,7 @@ from shapely.ops import substring
 
 from repro.errors import OutsidePore
 from repro.fem.brief import brief
-from repro.fem.elements import ELEMENTS, Element, parabola
+from repro.fem.elements import ELEMENTS, ON_ARC, Element, parabola
 from repro.fem.walls import (
     FREE,
     Seat,

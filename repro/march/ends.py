@@ -7,7 +7,8 @@ Each end is an event with a margin: zero at the event and positive after it.
     fold          Biot's limit / least elastic stretch of the free surface - 1
     pore's end    1 - distance to the end / element of the fluid, for each end of the pore
     meeting       1 - film / growth.minimum_film, for the film between two aggregates, between a
-                  welded one and a wall that it does not touch, or between two parts of a surface
+                  welded one and a wall that it does not touch, between two parts of a surface, or
+                  behind thicker water at a wall that the surface touches
     eroded        growth.minimum_film / thickness, or over the contact with its wall, - 1
 
 The largest margin is tested at t = 0, at the end of each step, and on both sides of a jump of the
@@ -49,7 +50,7 @@ from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.folding import Fold, fold_message, most_compressed
 from repro.march.state import Compression, StepResult
-from repro.model import adhesion
+from repro.model import adhesion, contact_lines
 from repro.model.adhesion import Loading, Peak
 from repro.model.pore import Pore
 from repro.model.solving import Solved
@@ -95,8 +96,8 @@ class Meeting(RunEnd):
     With ``growth.meeting = "weld"``, the default, two aggregates join instead, and the run
     continues, unless the weld would enclose water. Two aggregates on opposite walls enclose none.
     Two on one wall enclose none if they meet at this wall. A run also ends if a surface touches
-    itself so that water is enclosed, if welded aggregates touch in a second place, and if a welded
-    aggregate reaches a further wall.
+    itself so that water is enclosed, if welded aggregates touch in a second place, if a surface
+    touches a wall in a second place, and if a welded aggregate reaches a further wall.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the coordinates (um).
@@ -322,6 +323,7 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
         yield Event(1 - film / least, end, joins=None if reason else pair)
     for group in pore.groups:
         yield from _mouths(least, thicker * least, pore, group)
+        yield from _second_contacts(ends, pore, group)
         if len(group) > 1:
             yield from _further_contacts(least, pore, group)
 
@@ -342,6 +344,21 @@ def _mouths(least: float, thick: float, pore: Pore, group: tuple[int, ...]) -> I
                           f"the film is {_closes(film, least)}; this would enclose water")
             yield Event(1 - film / least, end)
             return
+
+
+def _second_contacts(ends: Ends, pore: Pore, group: tuple[int, ...]) -> Iterator[Event]:
+    """The events of a surface that touches a wall again beyond a valley, and encloses its water;
+    group: indices of the aggregates with this surface."""
+    least = ends.loading.growth.minimum_film
+    outline = welds.around([pore.outlines[number] for number in group])
+    for wall, film, (x, y) in contact_lines.second_contacts(
+            outline, pore.mesh.walls, least, ends.loading.numerics.tolerance):
+        subject = (f"{_names(pore, group)} touch" if len(group) > 1 else
+                   f"{pore.name_of(group[0])} touches")
+        end = Meeting(f"{subject} the wall y = {wall.y:g} um in a second place "
+                      f"at t = {pore.time:g} h: near x = {x:.4g}, y = {y:.4g} um the film is "
+                      f"{_closes(film, least)}; this would enclose water")
+        yield Event(1 - film / least, end)
 
 
 def _reason_against_weld(pore: Pore, pair: tuple[int, int], thin: float) -> str:

@@ -58,7 +58,8 @@ class ByLines(Closing):
     def __post_init__(self) -> None:
         keys = self.mechanics.keys
         walls = self.grown.walls
-        self._rule = Clearance(walls, keys.minimum_film, keys.minimum_contact_angle)
+        self._rule = Clearance(walls, keys.minimum_film, keys.minimum_contact_angle,
+                               self.mechanics.numerics.tolerance)
         self._start = self.start.mesh.points, self.start.pressure
         self._shapes = [(np.zeros(0), *self._start)]
         self._divided: Division | None = None

@@ -7,13 +7,14 @@ them and the contact surface join too.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
 from repro.errors import GrowthError
 from repro.fem.outline import Outline
 from repro.fem.walls import FREE, Walls, touched
-from repro.model.contact_lines import surface_ends
+from repro.model.contact_lines import surface_ends, would_enclose
 from repro.model.mechanics import CONTACT_ROUNDS, Closing, Expansion, equilibrium, with_new_surfaces
 
 
@@ -38,35 +39,44 @@ class ByNodes(Closing):
             gaps.append(shape.boundary.gap(walls))
             if not shape.body.spans:
                 self.search.refuse_late((before, gaps[-1]), film)
-            joins = closing_nodes(shape.boundary, walls, film, angle)
+            joins = closing_nodes(shape.boundary, walls, film, angle,
+                                  self.mechanics.numerics.tolerance)
             if not joins.any():
                 return Expansion(with_new_surfaces(shape), iterations, (before, gaps[0]))
             shape = shape.with_body(wall=np.where(joins != FREE, joins, shape.body.wall))
         raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds")
 
 
-def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float) -> np.ndarray:
+def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float,
+                  tolerance: float = 0.0) -> np.ndarray:
     """(M,) wall that each node must join next, or FREE (2.3.3).
 
-    At a wall without contact, a film thinner than ``film`` (um) closes. Beside a contact surface, a
+    At a wall without contact, the thinnest film closes if it is thinner than ``film`` (um), with
+    the nodes beside it whose films are too. Beside a contact surface, a
     wedge with an angle below ``angle`` (rad) closes: the gap must be at least min(film, tan(angle)
     d) at the distance d from the contact line. Nodes between closing nodes close too, so that no
-    fluid is trapped.
+    fluid is trapped. Nodes beyond a valley stay free: tolerance is that of
+    :func:`repro.model.contact_lines.would_enclose`.
     """
     joins = np.full(len(outline.points), FREE)
     for wall in walls:
         gap = wall.film(outline.points)
         lines = surface_ends(outline, wall.number)
         if not lines:
-            joins[(outline.wall == FREE) & (gap < film)] = wall.number
+            thin = (outline.wall == FREE) & (gap < film)
+            wide = np.cumsum(~thin)
+            tip = np.argmin(np.where(thin, gap, inf))
+            joins[thin & ((wide - wide[tip]) % wide[-1] == 0)] = wall.number
         for line, step in lines:
-            joins[_closing_run(outline, gap, line, step, film, np.tan(angle))] = wall.number
+            run = _closing_run(outline, gap, line, step, film, np.tan(angle), tolerance)
+            joins[run] = wall.number
     return joins
 
 
 def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float,
-                 slope: float) -> np.ndarray:
-    """Free nodes from a contact line outwards, up to the last node too close to the wall.
+                 slope: float, tolerance: float) -> np.ndarray:
+    """Free nodes from a contact line outwards, up to the last node too close to the wall before a
+    valley.
 
     gap: (M,) um; step: 1 or -1, direction along the outline; slope: tangent of the least angle.
     """
@@ -84,4 +94,5 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
         nearer = np.ones(len(walk), bool)
     along = np.sign(x[line] - x[(line - step) % count]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
+    thin &= ~np.logical_or.accumulate(would_enclose(along, gaps, film, tolerance))
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

@@ -13,13 +13,14 @@ ANGLE_FROM film / tan(angle) on. A converged surface comes nearest to the wall b
 Closer to the line the rule uses PART_OF_ANGLE tan(angle), so that no arc passes the wall.
 
 The contact surface is the smallest one without a negative clearance, so each line advances until
-its clearance vanishes. The secant method, safeguarded by bisection, moves all lines at once. Each
-trial is an equilibrium of the aggregate.
+its clearance vanishes. It does not cross a valley: a second contact would enclose the water of the
+valley, and ends the run (:func:`would_enclose`). The secant method, safeguarded by bisection, moves
+all lines at once. Each trial is an equilibrium of the aggregate.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import TypeAlias
@@ -28,7 +29,7 @@ import numpy as np
 
 from repro.errors import GrowthError
 from repro.fem.outline import Outline, arc_derivatives, parabola
-from repro.fem.walls import FREE, Walls, numbered, touched
+from repro.fem.walls import FREE, Wall, Walls, numbered, touched
 
 #: A clearance up to this size counts as zero. A line then errs by about CLOSE * film / tan(angle),
 #: 7e-4 um or 0.02 % of a short contact length. With 5e-4 the first length of ``exact`` in
@@ -114,11 +115,15 @@ class FirstContact(Exception):
 
 @dataclass(frozen=True)
 class Clearance:
-    """The rule for a free surface: walls of the pore, least film (um), least angle (rad)."""
+    """The rule for a free surface: walls of the pore, least film (um), least angle (rad).
+
+    tolerance: of :func:`would_enclose`.
+    """
 
     walls: Walls
     film: float
     angle: float
+    tolerance: float = 0.0
 
     def beyond(self, outline: Outline, node: int, direction: int) -> tuple[float, float]:
         """The clearance beyond a contact line, and the distance up to which it is negative.
@@ -163,6 +168,12 @@ class Clearance:
         ratio[beside] = np.minimum(gap[beside] / needs[beside] - 1, AMPLE)
         through = facing & (needs <= 0) & (gap < 0)
         ratio[through] = gap[through] / self.film
+        if ratio.min() < 0:
+            along, gap, _ = surface_beyond(outline, wall, node, direction)
+            behind = np.flatnonzero(would_enclose(along, gap, self.film, self.tolerance))
+            if len(behind):
+                arc, k = divmod(behind[0], len(PLACES))
+                ratio[place >= arc + PLACES[k]] = AMPLE
         return float(ratio.min()), float(place[ratio < 0].max(initial=0.0))
 
     def _places(self, arcs: np.ndarray, numbers: np.ndarray, outwards: float,
@@ -192,14 +203,74 @@ class Clearance:
         return np.concatenate(places), np.vstack(all_points)
 
 
+def would_enclose(along: np.ndarray, film: np.ndarray, least: float,
+                  tolerance: float) -> np.ndarray:
+    """(K,) True where contact with a wall would enclose water between a point and a contact line.
+
+    The film there is less than twice the least one, and a circle that touches the wall fits into
+    the water before it. The circle's diameter exceeds this film and the least one by more than the
+    tolerance. A point with the film h at the distance d along the wall bounds the diameter by
+    h + d^2 / h.
+
+    along, film: (K,) um, of a free surface from the line on; along is positive outside the contact
+    surface. least: um, least film; tolerance: relative.
+    """
+    thin = (along > 0) & (film < 2 * least)
+    needed = (1 + tolerance) * np.maximum(film, least)
+    if not (thin & (np.maximum.accumulate(film) > needed)).any():
+        return np.zeros(len(film), bool)
+    height = np.maximum(film, ROUND_OFF * least)
+    middle, roof = (0.5 * (values[1:] + values[:-1]) for values in (along, film))
+    circles = np.minimum(roof, np.min(height + (middle[:, None] - along) ** 2 / height, axis=1))
+    thickest = np.maximum.accumulate(np.append(0.0, np.where(middle > 0, circles, 0.0)))
+    return thin & (thickest > needed)
+
+
+def surface_beyond(outline: Outline, wall: Wall, node: int,
+                   direction: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(K,) um along the wall, (K,) um film and (K, 2) um of points of the free surface beyond a
+    contact line: the PLACES of arcs, or the nodes of straight edges.
+
+    node, direction: of the line, as :func:`surface_ends` returns them.
+    """
+    if outline.geometry == 1:
+        points = outline.points[_free_walk(outline, node, direction)]
+    else:
+        points = (AT_PLACES @ _free_arcs(outline, node, direction)[0]).reshape(-1, 2)
+    line = outline.points[node, 0]
+    outwards = np.sign(line - outline.points[(node - direction) % len(outline.points), 0])
+    return outwards * (points[:, 0] - line), wall.film(points), points
+
+
+def second_contacts(outline: Outline, walls: Walls, least: float,
+                    tolerance: float) -> Iterator[tuple[Wall, float, np.ndarray]]:
+    """Each wall that the outline would touch in a second place so that water is enclosed
+    (:func:`would_enclose`), the least film (um) there, and its point (2,) um on the outline."""
+    for wall in walls:
+        for node, direction in surface_ends(outline, wall.number):
+            along, film, points = surface_beyond(outline, wall, node, direction)
+            behind = would_enclose(along, film, least, tolerance)
+            last = _free_walk(outline, node, direction)[-1]
+            if outline.touches(wall.number)[last]:  # points belong to the nearer line
+                behind &= along <= np.abs(points[:, 0] - outline.points[last, 0])
+            if behind.any():
+                thinnest = np.argmin(np.where(behind, film, inf))
+                yield wall, float(film[thinnest]), points[thinnest]
+
+
+def _free_walk(outline: Outline, node: int, direction: int) -> np.ndarray:
+    """Nodes from a contact line over the free surface to the next contact surface or weld."""
+    count = len(outline.points)
+    walk = (node + direction * np.arange(count)) % count
+    return walk[: 2 + np.flatnonzero(outline.wall[walk[1:]] != FREE)[0]]
+
+
 def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray, int]:
     """(K, 3, 2) um, nodes of the free arcs beyond a contact line, from the line on; and the index
     of the last node."""
-    count = len(outline.points)
-    walk = (node + direction * np.arange(count)) % count
-    end = 1 + int(np.flatnonzero(outline.wall[walk[1:]] != FREE)[0])
-    nodes = outline.points[walk[: end + 1]]
-    return np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1), int(walk[end])
+    walk = _free_walk(outline, node, direction)
+    nodes = outline.points[walk]
+    return np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1), int(walk[-1])
 
 
 def surface_ends(outline: Outline, wall: int) -> list[tuple[int, int]]:

@@ -549,7 +549,8 @@ class Welding:
         outline = seen.boundary
         keys = self.mechanics.keys
         touched = tuple(wall for wall in seen.walls if outline.touches(wall.number).any())
-        wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle)
+        wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle,
+                             self.mechanics.numerics.tolerance)
         if outline.geometry == 2:
             middles = wall[1::2]
             before = np.where(middles != FREE, middles, wall[::2])

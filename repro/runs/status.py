@@ -20,6 +20,8 @@ RUN_ENDS = (re.compile(f"{AGGREGATE} reaches the pore's (?:up|down)stream end "
             re.compile(f"{AGGREGATE}'s surface touches itself at {TIME}: near x = .*"),
             re.compile(f"aggregates .* touch in a second place at {TIME}: near x = .*"),
             re.compile(rf"{AGGREGATE} touches the wall y = \S+ um at {TIME}: near x = .*"),
+            re.compile(rf"(?:{AGGREGATE} touches|aggregates .* touch) the wall y = \S+ um in a "
+                       f"second place at {TIME}: near x = .*"),
             re.compile(rf"aggregates .* and \S+ meet (?:at|in the step from) {TIME}(?:: .*)?"))
 
 

@@ -59,8 +59,8 @@ MUTANTS = (
         ("hard-half-the-angle",
          "Wedges close at half of the least contact angle.",
          "closing_nodes",
-         "_closing_run(outline, gap, line, step, film, np.tan(angle))",
-         "_closing_run(outline, gap, line, step, film, np.tan(angle / 2))")),
+         "_closing_run(outline, gap, line, step, film, np.tan(angle), tolerance)",
+         "_closing_run(outline, gap, line, step, film, np.tan(angle / 2), tolerance)")),
     *changes(
         "repro/model/traction.py",
         ("hard-forces-upstream",
