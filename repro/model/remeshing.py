@@ -22,10 +22,14 @@ from repro.model import biomass, growing, mesh_motion
 from repro.model.biomass import Amounts
 from repro.model.body import Body
 from repro.model.meshing import Meshing
-from repro.model.pore import LARGEST_DEFECT, Pore
+from repro.model.pore import Pore
 from repro.model.solid import material
 from repro.model.transport import Concentrations, concentrations
 from repro.scene import Scene, Substrate, Substrates, at_time
+
+#: Largest difference of the masses, relative to them, on two meshes of the same shape. Summation
+#: and the division of arcs err by less.
+ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +131,7 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
         return None
     target = replace(start, space=Space(mesh))
     pore, _ = _transferred(rules, expanded, target, generated.at)
-    return pore if abs(pore.mass - expanded.mass) <= LARGEST_DEFECT * expanded.mass else None
+    return pore if abs(pore.mass - expanded.mass) <= ROUND_OFF * expanded.mass else None
 
 
 def same_contact(pore: Pore, other: Pore) -> bool:
