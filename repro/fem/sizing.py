@@ -149,7 +149,8 @@ def _on_opposite(outline: Outline) -> np.ndarray:
 
 
 def in_contact(outlines: Sequence[Outline], sizing: Sizing) -> Sizing:
-    """The sizes of a mesh around outlines: they grow faster with contact on an opposite wall."""
+    """The sizes of a mesh around outlines, with the gradation of a mesh in contact if one of them
+    touches the opposite wall."""
     if sizing.contact == inf or not any(_on_opposite(outline).any() for outline in outlines):
         return sizing
     return replace(sizing, gradation=CONTACT_GROWTH * sizing.gradation)

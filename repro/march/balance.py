@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from repro.errors import BalanceError
-from repro.model.pore import LARGEST_DEFECT, Pore
+from repro.model.pore import Pore
 from repro.model.transport_in_time import TransportInTime, transport_in_time
 from repro.model.uptake_law import uptake_law
 from repro.scene import Kinetics, Scene, Substrate, Substrates, at_largest
@@ -23,8 +23,8 @@ from repro.schemes import Scheme
 if TYPE_CHECKING:
     from repro.model.transport import Problem
 
-#: Largest accepted defect.
-LARGEST = LARGEST_DEFECT
+#: Largest accepted defect of a balance of masses.
+LARGEST = 1e-6
 #: Bound of the round-off in the difference of two masses, relative to a mass. Pairwise summation in
 #: blocks of 128 in 8 lanes errs by at most (16 + log2(n / 128)) eps, less than 40 eps for any mesh.
 #: A difference has two sums of X_A and two of X_I, so it errs by up to 4e-14.

@@ -186,10 +186,10 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
                   search: SearchOptions) -> Halfway:
     """Solve in the shape half way through a step of ``duration`` (h).
 
-    The rates at the start give this shape. Its welds end at corners, because only the rates of the
-    step follow from it. If the moved mesh is not acceptable, a new mesh replaces
-    it. The masses are then carried to the points of the new mesh, and the rates back to the points
-    of the mesh at the start.
+    The rates at the start give this shape. Welds end at corners here, because this shape gives only
+    the rates of the step. If the moved mesh is not acceptable, a new mesh replaces it. The masses
+    are then carried to the points of the new mesh, and the rates back to the points of the mesh at
+    the start.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
     search = replace(search, advances=_last_advances(previous, 1, duration / 2), within_arcs=False)

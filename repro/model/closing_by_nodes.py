@@ -94,5 +94,6 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
         nearer = np.ones(len(walk), bool)
     along = np.sign(x[line] - x[(line - step) % count]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
-    thin &= ~np.logical_or.accumulate(would_enclose(along, gaps, film, tolerance))
+    behind = would_enclose(np.append(0.0, along), np.append(0.0, gaps), film, tolerance)[1:]
+    thin &= ~np.logical_or.accumulate(behind)
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

@@ -21,9 +21,6 @@ from repro.scene import needed
 if TYPE_CHECKING:
     from repro.model.transport import Concentrations
 
-#: Largest accepted defect of a balance of masses.
-LARGEST_DEFECT = 1e-6
-
 
 @brief
 @dataclass(frozen=True, eq=False)

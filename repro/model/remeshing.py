@@ -114,8 +114,9 @@ def _on_generated(rules: Remeshing, generated: GeneratedMesh, expanded: Pore) ->
 
     The mesh moves with the material. Returns None if the contact differs or if the moved mesh is
     not acceptable. It may have as many poor triangles as the generated one: in an acute corner
-    of the water each mesh has some. An arc that replaces several (:func:`welds.coarsened`) has
-    their area in the shape for which the mesh was generated alone.
+    of the water each mesh has some. One arc may replace several (:func:`welds.coarsened`). It has
+    their area only in the shape for which the mesh was generated, so the result is also None if
+    the mass changes by more than ROUND_OFF.
     """
     shape, start = generated.shape, generated.pore
     old = expanded.mesh

@@ -181,10 +181,10 @@ class Notch:
             raise GrowthError("the weld advances beyond the nodes that are opposite each other")
 
     def predict(self, points: np.ndarray) -> None:
-        """Join all pairs but one until no film is too thin in a given shape.
+        """Join one pair fewer than would close all thin films of a shape.
 
-        points: (N, 2) um, of its mesh. Films open when pairs beside them join, so the last pair is
-        usually not needed.
+        points: (N, 2) um, nodes of its mesh. A joined pair opens the films beside it, so the last
+        pair is usually not needed.
         """
         joined = self.joined
         while joined < self._last and self.too_thin(points, joined):
@@ -363,8 +363,8 @@ class Welding:
     def _within_arcs(self, shape: Pore) -> Expansion:
         """The shape with each end of the weld within the last arcs that have joined.
 
-        shape: the equilibrium with these arcs. It is the result if there is no equilibrium with a
-        shorter weld, or if its films are too thin.
+        shape: the equilibrium with these arcs. It is the result if ``within_arcs`` is False, if
+        there is no equilibrium with a shorter weld, or if its films are too thin.
         """
         entire = Expansion(self._marked(shape), self._iterations)
         inside = [k for k, notch in enumerate(self._notches) if notch.joined and not notch.new]
