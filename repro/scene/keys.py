@@ -450,7 +450,7 @@ class Numerics:
         1.0, UP_TO_20, source="3.1 [E13]", about="Divides the element sizes")
     gradation: float = number(
         0.25, FRACTION, source="3.1 [E13]",
-        about="Growth of element sizes with distance from the aggregate, twice as large in contact; "
+        about="Growth of element sizes with distance from an aggregate, doubled in contact; "
               "0: one size everywhere")
     contact_elements: float = number(
         0.0, FROM_0_TO_100,
