@@ -250,16 +250,14 @@ class Coupled:
         """Steps (arcs) of the lines to the roots of their clearances.
 
         moves: {line: (n, 2) um per arc}. If a line stops before its root, the steps of the other
-        lines are solved for again. A line stays if its clearance does not rise with its advance,
-        because the shape is then usually far from equilibrium. A line just beyond a corner rests
-        there if its root lies between BESIDE before and BESIDE beyond the corner. near: is the
-        shape close to equilibrium?
+        lines are solved for again. A line just beyond a corner rests there if its root lies between
+        BESIDE before and BESIDE beyond the corner. near: is the shape close to equilibrium?
         """
         lines = [self._lines[k] for k in moves]
         rises = np.array([self.placed.clearances(position + MODEST * move, lines)[0] - clearances
                           for move in moves.values()]).T / MODEST
         steps = np.zeros(len(lines))
-        free = rises.diagonal() > 0
+        free = np.ones(len(lines), bool)
         while free.any():
             rest = clearances + rises[:, ~free] @ steps[~free]
             steps[free] = np.linalg.solve(rises[np.ix_(free, free)], -rest[free])
