@@ -298,7 +298,7 @@ def test_newton_gives_up_as_soon_as_no_line_moves(plugged, monkeypatch):
     iterations = record_iterations(monkeypatch)
     monkeypatch.setattr(contact_newton.Coupled, "_accepts", lambda coupled: False)
     expanded_by(*plugged, 1.1)
-    assert 0 < max(iterations) < contact_newton.MOST_ITERATIONS
+    assert 0 < iterations[0] < contact_newton.MOST_ITERATIONS
 
 
 def test_lines_advance_the_farther_the_more_biomass_grows(plugged):
