@@ -322,21 +322,23 @@ def _meetings(ends: Ends, pore: Pore) -> Iterator[Event]:
                       f"y = {y:.4g} um the film between them is {_closes(film, least)}; {reason}")
         yield Event(1 - film / least, end, joins=None if reason else pair)
     for group in pore.groups:
-        yield from _mouths(least, thicker * least, pore, group)
-        yield from _second_contacts(ends, pore, group)
+        around = welds.around([pore.outlines[number] for number in group])
+        yield from _mouths(least, thicker * least, pore, group, around)
+        yield from _second_contacts(ends, pore, group, around)
         if len(group) > 1:
             yield from _further_contacts(least, pore, group)
 
 
-def _mouths(least: float, thick: float, pore: Pore, group: tuple[int, ...]) -> Iterator[Event]:
+def _mouths(least: float, thick: float, pore: Pore, group: tuple[int, ...],
+            around: Outline) -> Iterator[Event]:
     """The events of the films of a surface with itself that separate water from the pore.
 
     least: um, growth.minimum_film; thick: um, slightly more: behind the film, thinner water than
-    this counts as a part of the film; group: indices of the aggregates with this surface.
+    this counts as a part of the film; group: indices of the aggregates with this surface; around:
+    their outline.
     """
-    outline = welds.around([pore.outlines[number] for number in group])
     for diameter in (thick, 2 * thick):  # the second one finds a film before it is too thin
-        film, (x, y) = outline.mouth(diameter)
+        film, (x, y) = around.mouth(diameter)
         if film < inf:
             surface = (f"{_names(pore, group)} touch in a second place" if len(group) > 1 else
                        f"{pore.name_of(group[0])}'s surface touches itself")
@@ -346,13 +348,15 @@ def _mouths(least: float, thick: float, pore: Pore, group: tuple[int, ...]) -> I
             return
 
 
-def _second_contacts(ends: Ends, pore: Pore, group: tuple[int, ...]) -> Iterator[Event]:
-    """The events of a surface that touches a wall again beyond a valley, and encloses its water;
-    group: indices of the aggregates with this surface."""
+def _second_contacts(ends: Ends, pore: Pore, group: tuple[int, ...],
+                     around: Outline) -> Iterator[Event]:
+    """The events of a surface that touches a wall again beyond a valley, and encloses its water.
+
+    group, around: as for :func:`_mouths`.
+    """
     least = ends.loading.growth.minimum_film
-    outline = welds.around([pore.outlines[number] for number in group])
     for wall, film, (x, y) in contact_lines.second_contacts(
-            outline, pore.mesh.walls, least, ends.loading.numerics.tolerance):
+            around, pore.mesh.walls, least, ends.loading.numerics.tolerance):
         subject = (f"{_names(pore, group)} touch" if len(group) > 1 else
                    f"{pore.name_of(group[0])} touches")
         end = Meeting(f"{subject} the wall y = {wall.y:g} um in a second place "

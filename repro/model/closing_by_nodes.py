@@ -14,7 +14,7 @@ import numpy as np
 from repro.errors import GrowthError
 from repro.fem.outline import Outline
 from repro.fem.walls import FREE, Walls, touched
-from repro.model.contact_lines import surface_ends, would_enclose
+from repro.model.contact_lines import free_walk, surface_ends, would_enclose
 from repro.model.mechanics import CONTACT_ROUNDS, Closing, Expansion, equilibrium, with_new_surfaces
 
 
@@ -51,12 +51,11 @@ def closing_nodes(outline: Outline, walls: Walls, film: float, angle: float,
                   tolerance: float = 0.0) -> np.ndarray:
     """(M,) wall that each node must join next, or FREE (2.3.3).
 
-    At a wall without contact, the thinnest film closes if it is thinner than ``film`` (um), with
-    the nodes beside it whose films are too. Beside a contact surface, a
-    wedge with an angle below ``angle`` (rad) closes: the gap must be at least min(film, tan(angle)
-    d) at the distance d from the contact line. Nodes between closing nodes close too, so that no
-    fluid is trapped. Nodes beyond a valley stay free: tolerance is that of
-    :func:`repro.model.contact_lines.would_enclose`.
+    At a wall without contact, the run of nodes closest to the wall closes if its films are thinner
+    than ``film`` (um). Beside a contact surface, a wedge with an angle below ``angle`` (rad)
+    closes: the gap must be at least min(film, tan(angle) d) at the distance d from the contact
+    line. Nodes between closing nodes close too, so that no fluid is trapped. Nodes beyond a valley
+    stay free: tolerance is that of :func:`repro.model.contact_lines.would_enclose`.
     """
     joins = np.full(len(outline.points), FREE)
     for wall in walls:
@@ -80,11 +79,8 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
 
     gap: (M,) um; step: 1 or -1, direction along the outline; slope: tangent of the least angle.
     """
-    count = len(gap)
-    walk = (line + step * np.arange(1, count)) % count
-    reach = np.flatnonzero(outline.wall[walk] != FREE)[0]
-    other = walk[reach]
-    walk = walk[:reach]
+    _, *free, other = free_walk(outline, line, step)
+    walk = np.array(free, int)
     x = outline.points[:, 0]
     gaps = gap[walk]
     apart = x[walk] - x[line]
@@ -92,7 +88,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if touched(outline.wall[other]) != touched(outline.wall[line]):
         nearer = np.ones(len(walk), bool)
-    along = np.sign(x[line] - x[(line - step) % count]) * apart
+    along = np.sign(x[line] - x[(line - step) % len(x)]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     behind = would_enclose(np.append(0.0, along), np.append(0.0, gaps), film, tolerance)[1:]
     thin &= ~np.logical_or.accumulate(behind)

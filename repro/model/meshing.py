@@ -39,7 +39,7 @@ BOUNDARY_LAYER = 0.15
 #: Largest refinement for layers. A finer mesh has more nodes, the square of this, than the 32-bit
 #: indices of sparse matrices can count.
 FINEST_LAYERS = 2.0**15.5
-#: The edges at the tips of an outline are at least W over this long.
+#: W over the least length of the edges at the tips of an outline.
 MOST_AT_TIPS = 20_000.0
 
 

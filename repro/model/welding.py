@@ -341,20 +341,19 @@ class Welding:
         tied = np.concatenate([np.empty((0, 2), int), *(notch.tied for notch in joined)])
         for notch in joined:
             notch.predict(shape.mesh.points)
-        known: dict[tuple[int, ...], Pore] = {}  # shapes of trials with the same walls
+        equilibria: dict[tuple[int, ...], Pore] = {}  # of trials with the same walls
         for _ in range(CONTACT_ROUNDS):
             joins = tuple(notch.joined for notch in self._notches)
-            shape = known[joins] if joins in known else self._joined(shape, tied)
-            known[joins] = shape
+            shape = equilibria[joins] if joins in equilibria else self._joined(shape, tied)
+            equilibria[joins] = shape
             tied = self._tied()
             for notch in self._notches:
                 notch.advance(shape.mesh.points)
             walls = [self._closing(shape, number) for number in self.group]
-            at_rest = np.array_equal(self._tied(), tied)
-            if at_rest and not any((wall != FREE).any() for wall in walls):
-                return self._within_arcs(shape)
             if any((wall != FREE).any() for wall in walls):
-                known = {}
+                equilibria = {}
+            elif np.array_equal(self._tied(), tied):
+                return self._within_arcs(shape)
             for number, wall in zip(self.group, walls):
                 seen = shape.focused(number)
                 shape = seen.with_body(wall=np.where(wall != FREE, wall, seen.body.wall))

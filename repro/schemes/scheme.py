@@ -30,8 +30,8 @@ class Scheme:
         They determine the spaces of velocity and pressure (:mod:`repro.model.flow`), the
         integration of uptake and growth (:mod:`repro.fem.space`), the stabilisation of growth
         (:mod:`repro.model.growth`) and the rule by which films close
-        (:data:`repro.model.contact.CLOSINGS`). Another scheme with these elements has their values
-        of ``transfer`` and of the last four choices.
+        (:data:`repro.model.contact.CLOSINGS`). A scheme with the same elements must have the same
+        ``transfer`` and the same last four choices.
     steps : {"updates", "midpoint"}
         Shape updates every ``growth.time_step`` (section 2), or the midpoint rule with error
         control (:mod:`repro.march`).
