@@ -31,7 +31,7 @@ def test_differences_of_scenes_are_listed_key_by_key(fast, paper, flow_only):
     differences = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
     assert differences == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
                      "numerics.refinement": ["0.2", "1"], "numerics.tolerance": ["0.0075", "0.01"],
-                     "numerics.contact_elements": ["1", "0"], "output.every": ["0.5 h", "-"]}
+                     "numerics.contact_elements": ["3", "0"], "output.every": ["0.5 h", "-"]}
     differences = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
     assert {"growth.end": ["1 h", "-"], "flow.mean_velocity": ["-", "2.9 m/day"]}.items() <= differences.items()
     assert comparison.differences([read(fast), read(fast)]) == []

@@ -67,7 +67,7 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "numerics.tolerance": 0.0075,
     "numerics.refinement": 0.2,
     "numerics.gradation": 0.25,
-    "numerics.contact_elements": 1.0,
+    "numerics.contact_elements": 3.0,
 }
 #: Every section with its required keys alone.
 EVERYTHING = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}}

@@ -14,6 +14,7 @@ from reference import surface_stretch
 from repro.errors import GrowthError, MeshError
 from repro.fem import welds
 from repro.fem.outline import half_disc, polygon
+from repro.fem.sizing import GRADATION
 from repro.fem.walls import WELD, channel_walls, on_any
 from repro.march.ends import Ends, _meetings, _reason_against_weld, nearest_end
 from repro.model import adhesion, surface, welding
@@ -94,7 +95,8 @@ def test_beyond_a_weld_both_surfaces_have_opposite_corners(pair):
         count = welds.opposite_corners(one, two)
         assert count > 10 and one[count - 1] > 3.0
         assert (np.abs(one[1:count] - two[1:count]) < 0.6 * np.diff(one[:count])).all()
-        assert np.diff(one[:3]).max() <= 1.01 * sizes.moving_lines
+        at_line = max(sizes.contact, welds.FINEST * sizes.film)
+        assert np.diff(one[:3]).max() <= at_line + GRADATION * one[2]
 
 
 @cache
@@ -120,7 +122,7 @@ def test_a_new_mesh_merges_small_edges_of_a_weld_and_keeps_areas_and_common_poin
     edges = np.diff(welds.lengths_from(outlines[0], walk))
     # SPLIT times the size beside the line; no edge is longer than its distance from the line allows.
     from_line = np.minimum(np.cumsum(edges), np.cumsum(edges[::-1])[::-1])
-    assert (edges <= 1.4 * (sizes.moving_lines + 0.25 * from_line) + 1e-9).all()
+    assert (edges <= 1.4 * (sizes.contact + 0.25 * from_line) + 1e-9).all()
 
 
 def test_corners_beyond_a_weld_leave_in_pairs():

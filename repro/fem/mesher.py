@@ -67,6 +67,7 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
     crosses itself, another outline, a wall or an end of the channel, or if a curved triangle is
     turned over.
     """
+    sizing = sizes_of.in_contact(outlines, sizing)
     outlines = welds.coarsened(outlines, sizing)
     for _ in range(HALVINGS):
         outlines = [sizes_of.split(outline, beside)

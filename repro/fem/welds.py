@@ -330,7 +330,7 @@ def _refined(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
 
 def _line_size(sizing: Sizing) -> float:
     """Size (um) of the elements beside the ends of a weld."""
-    return max(sizing.moving_lines, FINEST * sizing.film)
+    return max(sizing.contact, FINEST * sizing.film)
 
 
 def in_notch(outlines: Sequence[Outline], walks: Sequence[np.ndarray],

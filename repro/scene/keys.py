@@ -450,7 +450,8 @@ class Numerics:
         1.0, UP_TO_20, source="3.1 [E13]", about="Divides the element sizes")
     gradation: float = number(
         0.25, FRACTION, source="3.1 [E13]",
-        about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
+        about="Growth of element sizes with distance from an aggregate, doubled in contact; "
+              "0: one size everywhere")
     contact_elements: float = number(
         0.0, FROM_0_TO_100,
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
@@ -475,9 +476,9 @@ SCHEMES = {"fast": CURVED, "accurate": CURVED, "exact": CURVED, "paper": PAPER,
 #: under 0.01 % (see `make bench`); the paper's own scheme; the scheme as printed, with transient
 #: substrates (3.3); the coarse run of `repro check`.
 PRESETS: dict[str, dict[str, Any]] = {
-    "fast": {"refinement": 0.2, "tolerance": 0.0075, "contact_elements": 1.0},
-    "accurate": {"refinement": 0.45, "tolerance": 0.001, "contact_elements": 2.0},
-    "exact": {"refinement": 0.7, "tolerance": 0.00025, "contact_elements": 20.0},
+    "fast": {"refinement": 0.2, "tolerance": 0.0075, "contact_elements": 3.0},
+    "accurate": {"refinement": 0.45, "tolerance": 0.001, "contact_elements": 8.0},
+    "exact": {"refinement": 0.7, "tolerance": 0.00025, "contact_elements": 30.0},
     "paper": {},
     "as_printed": {"transport": "gear"},
     "sketch": {"refinement": 0.05, "tolerance": 0.01},

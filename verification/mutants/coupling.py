@@ -102,7 +102,7 @@ MUTANTS = (
          f"{BODIES}a_film_between_two_aggregates_has_elements_as_small_as_one_at_a_wall[2]"),
         ("seat-always-below",
          "Elements beside contact are small at the upper wall, also if the seed sat there.",
-         "_contact_sizes",
+         "_on_opposite",
          "wall != outline.seat.wall",
          "wall != 1",
          "tests/test_walls.py::test_elements_beside_contact_are_small_at_the_wall_without_the_seed[upper]")),
