@@ -17,7 +17,7 @@ from repro.march import midpoint, simulation
 from repro.march.simulation import simulate
 from repro.march.state import RestartState
 from repro.march.step_control import StepControl
-from repro.model import closing_by_lines, contact, contact_lines, contact_newton, growth
+from repro.model import closing_by_lines, contact, contact_lines, contact_newton, growth, traction
 from repro.model.closing_by_lines import ByLines, divided
 from repro.model.closing_by_nodes import closing_nodes
 from repro.model.configuration import FromPrevious
@@ -354,6 +354,25 @@ def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(pl
     kept = contact.expand(Mechanics.of(scene), pore, [1.03 * pore.body.theta], search=search).advances
     assert max(abs(asked[key] - moved[key]) for key in moved) > 0.05
     assert kept == pytest.approx(asked, rel=1e-9)
+
+
+def test_contact_lines_rest_under_the_forces_of_the_fluid(plugged, monkeypatch):
+    """The aggregate is pulled off the wall by a force that grows with the contact length. A line rests if it moves
+    by at most twice the error 5e-4 film / tan(angle) of a position. The bound is ten times this. If lines rest as soon
+    as no node joins or leaves the wall, the clearance is 0.08."""
+    scene, pore = plugged
+    scene = replace(scene, flow=load_scene("wide").flow, growth=replace(scene.growth, fluid_forces="included"))
+
+    def pull(_fluid, _around, shaped):
+        points = shaped.mesh.points[shaped.mesh.body]
+        joined = shaped.boundary.points[shaped.boundary.touches(TOP), 0]
+        return np.column_stack([np.zeros(len(points)), -6e-4 * np.ptp(joined) * (points[:, 1] > pore.mesh.width / 2)])
+
+    monkeypatch.setattr(traction, "forces", pull)
+    shape = contact.expand(Mechanics.of(scene), pore, [1.1 * pore.body.theta]).pore
+    rule = Clearance(pore.walls, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+    beyond = [value for (wall, _), value in clearances(shape.boundary, rule).items() if wall == TOP]
+    assert len(beyond) == 2 and np.abs(beyond).max() < 0.01
 
 
 def with_line_size(scene, pore, size, advances, factor=1.3):

@@ -221,7 +221,7 @@ def test_the_last_step_uses_finer_elements_if_a_front_needs_them(needed, message
     attempt = midpoint.attempt
 
     def cut(scene, state, solved, duration, *most, **named):
-        if duration == 0.3 and state.front < needed:
+        if duration <= 0.3 and state.front < needed:
             raise Unresolved("the mesh is too coarse")
         return attempt(scene, state, solved, duration, *most, **named)
 
@@ -232,6 +232,21 @@ def test_the_last_step_uses_finer_elements_if_a_front_needs_them(needed, message
             list(scene)
     else:
         assert [instant.pore.front for instant in scene][-1] == needed
+
+
+def test_shorter_steps_lead_to_an_end_that_one_step_does_not_reach(monkeypatch):
+    """A step past the end is accepted, and the step to the end fails."""
+    attempt, tried = midpoint.attempt, []
+
+    def fails_to_the_end(scene, state, solved, duration, *most, **named):
+        tried.append(duration)
+        if duration == 0.3:
+            raise GrowthError("no rest")
+        return attempt(scene, state, solved, duration, *most, **named)
+
+    monkeypatch.setattr(midpoint, "attempt", fails_to_the_end)
+    *_, last = simulation.simulate(base('growth.end="0.3 h"', 'output.times=["0.3 h"]'))
+    assert tried[0] > 0.3 and tried.count(0.3) == 2 and last.pore.time == 0.3
 
 
 @pytest.mark.parametrize("error", [Unresolved("the mesh is too coarse"), GrowthError("no rest")])

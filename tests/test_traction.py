@@ -82,8 +82,7 @@ def test_a_closed_pore_may_have_larger_forces_than_the_open_one(monkeypatch, ord
 
 def test_nodes_stay_on_a_wall_that_they_join_in_every_other_round(monkeypatch):
     """The forces lift the aggregate while one node at most is on the wall. Two more nodes then join, the forces vanish,
-    and the two leave. After four rounds the node on the wall stays there. The lifted neighbours are then not thinner
-    than their wedge may be, so that shape and forces agree."""
+    and the two leave. Where two rounds have the same nodes on the wall, these stay. Shape and forces agree."""
     scene = load_scene("wide", ["numerics.preset=fast", exchange(elements="linear"), "pore.width=25 um",
                                 "aggregate.radius=23 um", "numerics.contact_elements=0",
                                 "growth.fluid_forces=included"])
@@ -96,26 +95,18 @@ def test_nodes_stay_on_a_wall_that_they_join_in_every_other_round(monkeypatch):
 
     monkeypatch.setattr(traction, "forces", lifting)
     assert contact.expand(Mechanics.of(scene), seed, [1.03 * seed.body.theta]).pore.contact
-    alternating, settled = counts[1:5], counts[5:]
-    assert alternating == [3, 1, 3, 1] and settled and set(settled) == {1}
+    assert counts[1:4] == [3, 1, 3] and set(counts[4:]) == {3}
 
 
 @pytest.mark.parametrize("gain", [-0.9, 0.3, 0.8, 0.95])
 def test_rounds_agree_whatever_part_of_a_change_returns(gain):
-    """Forces f and their response 1 + gain f agree at f = 1 / (1 - gain), in two modes, one with 0.9 of the gain. Five
-    rounds take the last response. Two secants through the next three rounds solve two linear modes."""
+    """Forces f and their response 1 + gain f agree at f = 1 / (1 - gain), in two modes, one with 0.9 of the gain. Two
+    secants through the first three rounds solve two linear modes."""
     rounds, gains = contact._Rounds(), gain * np.array([1.0, 0.9])
     forces = np.zeros(2)
-    for _ in range(9):
+    for _ in range(5):
         forces = rounds.next_forces(1 + gains * forces)
     assert forces == pytest.approx(1 / (1 - gains), rel=1e-6)
-
-
-def test_rounds_take_the_last_response_while_contact_lines_move():
-    """Each of these rounds has contact lines of its own. They do not show how forces change the later responses."""
-    rounds, responses = contact._Rounds(), np.random.default_rng(1).normal(size=(contact.SETTLING_ROUNDS + 2, 4, 2))
-    for response in responses:
-        assert rounds.next_forces(response) is response
 
 
 @pytest.mark.parametrize("moves, stalled", [
@@ -123,5 +114,5 @@ def test_rounds_take_the_last_response_while_contact_lines_move():
     ([1.0, 0.1, 0.3, 0.2, 0.4, 0.2, 0.04, 0.1, 0.2, 0.3], False),
     ([1.0, 0.1, 0.3, 0.2, 0.4, 0.2, 0.06, 0.1, 0.2], True)])
 def test_rounds_stall_if_the_least_move_does_not_halve(moves, stalled):
-    """Moves may rise. The first rounds, in which contact lines move, do not count."""
-    assert contact._Rounds(moves=[1e-3] * contact.SETTLING_ROUNDS + moves).stalled is stalled
+    """Moves may rise."""
+    assert contact._Rounds(moves=moves).stalled is stalled

@@ -65,14 +65,18 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
              planned: StepControl) -> tuple[StepResult, Solved, StepControl]:
     """Advance one full step, or a step to growth.end if growth.end lies within the full step.
 
-    The length of the full step does not depend on growth.end or on the requested rows.
+    If the step to growth.end fails, shorter steps lead to it. The length of the full step does not
+    depend on growth.end or on the requested rows.
     """
     corner = stages.tables.corner(previous.time)
     step, after, control = _find_step(stages, previous, solved, planned, corner)
     within = partial(_row, stages, previous, solved, planned, step.within)
     if step.pore.time - stages.growth.end > SAME_TIME:
-        step, after = _cut(stages, previous, solved, stages.growth.end)
-        control = planned
+        try:
+            step, after = _cut(stages, previous, solved, stages.growth.end)
+            control = planned
+        except (StageError, FloatingPointError):
+            step, after, control = _find_step(stages, previous, solved, planned, stages.growth.end)
     return replace(step, within=within), after, control
 
 

@@ -27,6 +27,7 @@ from repro.model.contact_lines import PATIENT, Advances, SearchOptions
 from repro.model.finer_lines import with_finer_lines
 from repro.model.mechanics import Closing, Expansion, Mechanics
 from repro.model.pore import Pore
+from repro.scene import Growth
 
 #: {geometry of the triangles: closing of films}.
 CLOSINGS: dict[int, type[Closing]] = {1: ByNodes, 2: ByLines}
@@ -39,9 +40,6 @@ MISSED = 4
 #: Growth of the triangles' size with the distance from a line. Bisection keeps good angles for any
 #: value.
 LINE_GRADATION = 1.0
-#: Contact lines do not move any more after this number of rounds of shape and fluid forces, because
-#: each search moves them by up to its tolerance or an edge. Nodes on a wall then stay there too.
-SETTLING_ROUNDS = 4
 #: Shape and flow agree if the last round moves no node by more than this, over the aggregate's
 #: thickness.
 FORCE_REST = 1e-8
@@ -84,7 +82,9 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     -----
     With fluid forces, shape and flow are computed in turn until both agree. If the forces change,
     the flow around the new shape changes them again, by up to 0.6 of the first change after
-    contact. Anderson acceleration therefore chooses the forces of each round. The film at the first
+    contact. Anderson acceleration therefore chooses the forces of each round. Contact lines and
+    nodes on walls move until they rest. Then they stay, because each search moves a line by its
+    tolerance. The film at the first
     contact is tested under the forces of the open pore, because the forces are larger in a closed
     pore.
 
@@ -153,27 +153,45 @@ def _expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray], star
     water = traction.SurroundingFlow(mechanics.fluid, grown)
     shape = Expansion(grown, 0)
     iterations = 0
-    rounds = _Rounds()
-    while not rounds.stalled:
-        last = shape
-        forces = rounds.next_forces(last.gathered(water.forces(last.pore)))
-        shape = shape_under(mechanics, grown, theta, start, forces, search)
-        rounds.moves.append(float(np.abs(shape.position - last.position).max()))
-        iterations += shape.iterations
-        if rounds.agree(min(outline.thickness for outline in shape.pore.outlines)):
-            return replace(shape, iterations=iterations)
-        stationary = len(rounds.moves) >= SETTLING_ROUNDS
-        landing = -np.inf if shape.pore.spanning > grown.spanning else search.landing
-        search = replace(search, advances=shape.advances, stationary=stationary, landing=landing)
+    for stationary in (False, True):
+        rounds = _Rounds()
+        search = replace(search, stationary=stationary)
         if stationary and not shape.divisions:
             start = replace(start, bodies=tuple(
                 replace(body, wall=rest.wall)
                 for body, rest in zip(start.bodies, shape.pore.bodies)))
+        while not rounds.stalled:
+            last = shape
+            forces = rounds.next_forces(last.gathered(water.forces(last.pore)))
+            shape = shape_under(mechanics, grown, theta, start, forces, search)
+            if stationary:
+                shape = replace(shape, gaps=last.gaps)
+            rounds.moves.append(float(np.abs(shape.position - last.position).max()))
+            iterations += shape.iterations
+            if stationary and rounds.agree(min(outline.thickness
+                                               for outline in shape.pore.outlines)):
+                return replace(shape, iterations=iterations)
+            landing = -np.inf if shape.pore.spanning > grown.spanning else search.landing
+            search = replace(search, advances=shape.advances, landing=landing)
+            if not stationary and _lines_rest(shape, last, mechanics.keys):
+                break
     raise GrowthError("the fluid's forces and the shape do not agree: after "
                       f"{len(rounds.moves)} rounds a node still moves by {rounds.moves[-1]:.2g} "
                       "um, and more rounds do not reduce this: the aggregate is too soft for this "
                       "flow; try a larger growth.shear_modulus, or "
                       'growth.fluid_forces = "neglected"')
+
+
+def _lines_rest(shape: Expansion, last: Expansion, keys: Growth) -> bool:
+    """Do the contact lines rest between two rounds?
+
+    No node joins or leaves a wall, and no line moves by more than the errors of its two positions.
+    """
+    error = contact_lines.CLOSE * keys.minimum_film / np.tan(keys.minimum_contact_angle)
+    moves = [abs(length - last.advances.get(key, inf)) for key, length in shape.advances.items()]
+    return max(moves, default=0.0) <= 2 * error and all(
+        np.array_equal(body.wall, before.wall)
+        for body, before in zip(shape.pore.bodies, last.pore.bodies))
 
 
 @dataclass(eq=False)
@@ -191,14 +209,13 @@ class _Rounds:
     def next_forces(self, response: np.ndarray) -> np.ndarray:
         """Forces (n, 2) of the next round; response: (n, 2) forces of the flow around the shape.
 
-        As long as contact lines move, the forces are the response. Afterwards Anderson acceleration
-        combines the last rounds so that forces and responses differ least (Walker and Ni 2011, SIAM
-        J. Numer. Anal. 49, 1715).
+        Anderson acceleration combines the last rounds so that forces and responses differ least
+        (Walker and Ni 2011, SIAM J. Numer. Anal. 49, 1715).
         """
-        rounds = slice(max(SETTLING_ROUNDS, len(self.forces) - FORCE_WINDOW), None)
+        rounds = slice(max(0, len(self.forces) - FORCE_WINDOW), None)
         self.responses.append(response)
         forces = response
-        if len(self.forces[rounds]) > 1:
+        if len(self.forces) > 1:
             responses = np.array(self.responses[1:][rounds])
             differences = responses - self.forces[rounds]
             changes = np.diff(differences, axis=0).reshape(len(differences) - 1, -1)
@@ -209,11 +226,9 @@ class _Rounds:
 
     @property
     def stalled(self) -> bool:
-        """Do the last FORCE_WINDOW rounds fail to reduce the least move? Rounds in which contact
-        lines move do not count."""
-        settled = self.moves[SETTLING_ROUNDS:]
-        before = settled[:-FORCE_WINDOW]
-        return bool(before) and min(settled[-FORCE_WINDOW:]) > FORCE_REDUCTION * min(before)
+        """Do the last FORCE_WINDOW rounds fail to reduce the least move?"""
+        before = self.moves[:-FORCE_WINDOW]
+        return bool(before) and min(self.moves[-FORCE_WINDOW:]) > FORCE_REDUCTION * min(before)
 
     def agree(self, thickness: float) -> bool:
         """Do forces and shape agree, for an aggregate of a thickness (um)?"""
