@@ -14,7 +14,7 @@ import numpy as np
 from repro.errors import GrowthError
 from repro.fem.outline import Outline
 from repro.fem.walls import FREE, Walls, touched
-from repro.model.contact_lines import free_walk, surface_ends, would_enclose
+from repro.model.contact_lines import free_walk, outward_sign, surface_ends, would_enclose
 from repro.model.mechanics import CONTACT_ROUNDS, Closing, Expansion, equilibrium, with_new_surfaces
 
 
@@ -88,7 +88,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if touched(outline.wall[other]) != touched(outline.wall[line]):
         nearer = np.ones(len(walk), bool)
-    along = np.sign(x[line] - x[(line - step) % len(x)]) * apart
+    along = outward_sign(outline, line, step) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     behind = would_enclose(np.append(0.0, along), np.append(0.0, gaps), film, tolerance)[1:]
     thin &= ~np.logical_or.accumulate(behind)

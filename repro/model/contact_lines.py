@@ -147,7 +147,7 @@ class Clearance:
             without such a point.
         """
         arcs, last = _free_arcs(outline, node, direction)
-        outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
+        outwards = outward_sign(outline, node, direction)
         wall = numbered(self.walls, outline.wall[node])
         # Elsewhere the clearance is AMPLE. An arc lies within its control points.
         ends = wall.film(arcs[:, [0, 2]])
@@ -238,9 +238,17 @@ def surface_beyond(outline: Outline, wall: Wall, node: int,
         points = outline.points[free_walk(outline, node, direction)]
     else:
         points = (AT_PLACES @ _free_arcs(outline, node, direction)[0]).reshape(-1, 2)
-    line = outline.points[node, 0]
-    outwards = np.sign(line - outline.points[(node - direction) % len(outline.points), 0])
-    return outwards * (points[:, 0] - line), wall.film(points), points
+    along = outward_sign(outline, node, direction) * (points[:, 0] - outline.points[node, 0])
+    return along, wall.film(points), points
+
+
+def outward_sign(outline: Outline, node: int, direction: int) -> float:
+    """1 or -1, the sign of x away from a contact surface at its end.
+
+    node, direction: of the end, as :func:`surface_ends` returns them.
+    """
+    inside = (node - direction) % len(outline.points)
+    return float(np.sign(outline.points[node, 0] - outline.points[inside, 0]))
 
 
 def second_contacts(outline: Outline, walls: Walls, least: float,

@@ -2724,7 +2724,7 @@ MUTANTS = (
         ("wedges-of-one-wall",
          "Wedges beside the upper contact surface are measured the wrong way.",
          "_closing_run",
-         "along = np.sign(x[line] - x[(line - step) % len(x)]) * apart",
+         "along = outward_sign(outline, line, step) * apart",
          "along = step * apart",
          f"{MIRRORS}contact_advances_alike_in_a_pore_and_its_mirror_image")),
     *changes(
