@@ -15,6 +15,7 @@ from time import monotonic
 
 from repro.errors import OutputError, printable
 from repro.polling import polling
+from repro.runs.status import is_over
 
 Tell = Callable[[dict], None]
 #: Seconds between updates of the bar, and between lines: at first, and at most.
@@ -157,7 +158,7 @@ def _report_start_and_end(event: dict, say_aside: Callable[[str], None]) -> None
     if event["event"] == "start" and event["from_h"] > 0:
         say_aside(printable(f"{event['scene']}: resumes from t = {event['from_h']:g} h, "
                             f"step {event['step']}"))
-    if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
+    if event["event"] == "end" and is_over(event["status"]):
         suffix = "" if event["changed"] else ", already finished"
         say(printable(f"{event['scene']}: {event['status']}{suffix}; "
                       f"results in {event['folder']}"))

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from repro.errors import OutputError
+from repro.runs.status import FAILED
 from repro.scene.needed import package
 from repro.sweeps import pool, single_run
 from repro.sweeps.design import Point
@@ -102,6 +103,6 @@ def inspect_worker(path: str) -> tuple[str, bool]:
 def run_on_worker(expected: str, point: Point, folder: Path) -> str:
     """On a worker with the expected code: make a run in a process; return how the run ended."""
     if single_run.code() != expected:
-        return (f"failed: a worker that joined has version {single_run.code()} of this package, "
+        return (f"{FAILED}a worker that joined has version {single_run.code()} of this package, "
                 f"{expected} is needed")
     return _processes.make(point, folder, LEAVING)
