@@ -18,10 +18,9 @@ from repro.polling import polling
 from repro.runs.status import is_over
 
 Tell = Callable[[dict], None]
-#: Seconds between updates of the bar, and between lines: at first, and at most.
+#: Seconds between updates of the bar, and without a line.
 TICK = 0.5
-SILENCE = 1.0
-LONGEST = 1.5
+SILENCE = 1.5
 #: The bar, and its replacement on a terminal with fewer columns.
 WIDE = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
         "[{elapsed} < {remaining}{postfix}]")
@@ -74,11 +73,7 @@ def _warning(event: dict) -> str:
 
 @contextmanager
 def in_lines() -> Iterator[Tell]:
-    """Print a line after each tenth of the simulated time, after a silence, and at the end.
-
-    The silence is a fiftieth of the wall time, between SILENCE and LONGEST (s), which keeps a log
-    short.
-    """
+    """Print a line after each tenth of the simulated time, after a silence, and at the end."""
     begun = printed_at = monotonic()
     reached = 0
     last_step: dict = {}
@@ -100,8 +95,7 @@ def in_lines() -> Iterator[Tell]:
                 line()
 
     def tick() -> None:
-        silence = min(LONGEST, max(SILENCE, (monotonic() - begun) / 50))
-        if last_step and monotonic() - printed_at > silence:
+        if last_step and monotonic() - printed_at > SILENCE:
             contact = ", contact" if last_step["contact"] else ""
             line(f", step {last_step['step']}{contact}, {monotonic() - begun:.0f} s")
 

@@ -27,8 +27,6 @@ MOST_ROWS = 10_000  # of output.every
 SHORTEST_STEP = 1e-6  # h: times closer than 1e-9 h are equal
 FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
-INHIBITION = 100.0  # mg/L: the default of K_i
-LIMITING = 100.0  # the default of J_m
 TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
 
 #: A number or a table over time.
@@ -279,7 +277,7 @@ def _kinetics_rules(law: "Kinetics", donor: "Donor | None") -> Rules:
     yield haldane and donor is None, {
         "kinetics.law": '[substrates.donor] is needed with "Haldane": the donor inhibits',
         "substrates.acceptor": '[substrates.donor] is needed with kinetics.law = "Haldane"'}
-    changed = donor is not None and donor.inhibition_constant != INHIBITION
+    changed = donor is not None and donor.inhibition_constant != type(donor)().inhibition_constant
     yield changed and not haldane, _only_with(
         "substrates.donor.inhibition_constant", "kinetics.law", "Haldane")
 
@@ -307,7 +305,8 @@ def _growth_rules(scene: "Scene", growth: "Growth") -> Rules:
         "growth.after_detachment": "growth.bonding_strength or [growth.erosion] is needed with "
                                    "\"continue\"",
         "growth.bonding_strength": 'needed with growth.after_detachment = "continue"'}
-    yield growth.energy != "Gent" and growth.limiting_invariant != LIMITING, _only_with(
+    changed = growth.limiting_invariant != type(growth).limiting_invariant
+    yield changed and growth.energy != "Gent", _only_with(
         "growth.limiting_invariant", "growth.energy", "Gent")
     if growth.erosion:
         yield from _erosion_rules(scene, growth, growth.erosion)

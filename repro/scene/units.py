@@ -73,15 +73,21 @@ class Range(NamedTuple):
 
 POSITIVE = Range("greater than zero", lambda value: value > 0)
 NON_NEGATIVE = Range("zero or more", lambda value: value >= 0)
-FRACTION = Range("from 0 to 1", lambda value: 0 <= value <= 1)
 BELOW_1 = Range("zero or more, less than 1", lambda value: 0 <= value < 1)
-UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
-FROM_0_TO_100 = Range("from 0 to 100", lambda value: 0 <= value <= 100)
-UP_TO_20 = Range("greater than zero, at most 20", lambda value: 0 < value <= 20)
 #: Of a pore: below it water is no continuum; above it no pore is meant.
 PORE_WIDTH = Range("from 1 nm to 1 m", lambda value: 1e-3 <= value <= 1e6)
 ACUTE = Range("between 0 and 90 deg", lambda value: 0 < value < math.pi / 2)
 EITHER_SIGN = Range("of either sign", math.isfinite)
+
+
+def from_0_to(most: float) -> Range:
+    """Return the range from 0 to ``most``."""
+    return Range(f"from 0 to {most:g}", lambda value: 0 <= value <= most)
+
+
+def up_to(most: float) -> Range:
+    """Return the range of numbers greater than zero up to ``most``."""
+    return Range(f"greater than zero, at most {most:g}", lambda value: 0 < value <= most)
 
 
 class Stated(NamedTuple):
@@ -448,11 +454,6 @@ def quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
 def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, **described):
     """Declare a value with a unit, like :func:`quantity`, or a table over time."""
     return scene_key(Timed(unit, text, accepts), **described)
-
-
-def share(text: str, unit: str, of: str, **described):
-    """Declare a value with a unit, like :func:`quantity`, or a share of the key `of`."""
-    return scene_key(Share(unit, text, of=of), **described)
 
 
 def number(example: float, accepts: Range = POSITIVE, **described):
