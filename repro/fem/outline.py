@@ -117,7 +117,10 @@ class Outline:
         on_wall = np.flatnonzero(self.wall != FREE)[0]
         ring = np.roll(ring, -on_wall * (len(ring) // len(self.points)), axis=0)
         film, middle = inf, np.zeros(2)
-        if not _faces_itself(ring):
+        # Two points face each other across water that is wider behind them only if the line turns
+        # to the right, where the water is, by more than half a turn.
+        turned = np.unwrap(np.arctan2(*np.diff(ring, axis=0).T[::-1]))
+        if (np.maximum.accumulate(turned) - turned).max() <= np.pi:
             return film, middle
         line = shapely.LineString(ring)
         for pocket in shapely.Polygon(ring).buffer(thick / 2, quad_segs=ON_ARC).interiors:
@@ -226,15 +229,6 @@ class Outline:
         t = (-0.5 * along[arc, axis] / bend[arc, axis])[:, None]
         peaks = m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
         return np.concatenate([peaks, self.points])
-
-
-def _faces_itself(points: np.ndarray) -> bool:
-    """Does a line (K, 2), with the water on its right, turn to the right by more than half a turn?
-
-    Only then do two of its points face each other across water that is wider behind them.
-    """
-    turned = np.unwrap(np.arctan2(*np.diff(points, axis=0).T[::-1]))
-    return bool((np.maximum.accumulate(turned) - turned).max() > np.pi)
 
 
 def polygon_area(points: np.ndarray) -> float:

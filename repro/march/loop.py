@@ -168,7 +168,7 @@ def _grow(course: Course, state: RestartState,
         detached = len(step.pore.bodies) < len(pore.bodies)
         state = _after_step(state, step, solved, control)
         pore = replace(state.pore, concentrations=solved.concentrations)
-        row = _row_time_at(course.rows, pore.time)
+        row = next((row for row in course.rows if abs(row - pore.time) <= SAME_TIME), None)
         if course.every_step or row is not None or detached or event.margin > 0:
             reported = pore if row is None else replace(pore, time=row)
             report = make_report(state, reported, solved, step.before, shown)
@@ -265,11 +265,6 @@ def row_times(stepping: Stepping, scene: Scene) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0, ascending: output.times, or the scheme's times."""
     requested = scene.requested_times
     return stepping.rows(scene.growing.growth) if requested is None else requested
-
-
-def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
-    """Exact time (h) of the row at which a step ends; None if it ends at no row."""
-    return next((row for row in rows if abs(row - time) <= SAME_TIME), None)
 
 
 def _after_step(state: RestartState, step: StepResult, solved: Solved,

@@ -135,19 +135,10 @@ def _growth(scene: Scene, at: Report) -> float:
     return net_growth(at.solved.problem, at.pore, at.solved.concentrations, scene.kinetics)
 
 
-def _film(k: int, scene: Scene, at: Report) -> float:
-    spans = at.pore.bodies[k].spans
-    return 0.0 if spans else at.pore.outlines[k].gap(at.pore.mesh.walls)
-
-
 def _gap(k: int, scene: Scene, at: Report) -> float | None:
     outlines = at.pore.outlines
     others = (other for number, other in enumerate(outlines) if number != k)
     return min((outlines[k].film(other)[0] for other in others), default=None)
-
-
-def _contact_length(wall: int, k: int, scene: Scene, at: Report) -> float:
-    return at.pore.outlines[k].contact_length(numbered(at.pore.mesh.walls, wall))
 
 
 def _composition(index: int, scene: Scene, at: Report) -> float:
@@ -303,11 +294,15 @@ BODY = (
       for end, extreme in (("upstream", "smallest"), ("downstream", "largest"))),
     Quantity("aggregate_NAME_film_um", "thinnest film",
              "least thickness of the fluid between it and a wall that it does not touch; zero if "
-             "it touches both", _film, "film", "aggregate"),
+             "it touches both", lambda k, scene, at: (
+                 0.0 if at.pore.bodies[k].spans else at.pore.outlines[k].gap(at.pore.mesh.walls)),
+             "film", "aggregate"),
     Quantity("aggregate_NAME_gap_um", "distance from another aggregate",
              "least thickness of the fluid between it and another one", _gap, "gap", "aggregate"),
     *(Quantity(f"aggregate_NAME_{wall}_contact_um", f"contact with the {wall} wall",
-               "length of its contact surface there", partial(_contact_length, number),
+               "length of its contact surface there",
+               lambda k, scene, at, number=number: at.pore.outlines[k].contact_length(
+                   numbered(at.pore.mesh.walls, number)),
                f"{wall} contact", "aggregate")
       for wall, number in (("lower", BOTTOM), ("upper", TOP))),
     Quantity("aggregate_NAME_biomass_pg_per_m", "biomass", "integral of X_A + X_I",
