@@ -207,7 +207,7 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
         end = locate(shorter, pore.time, margin, end)
         end = replace(end, step=replace(end.step, within=step.within))
     elif stages.tables.jumps(step.pore.time):
-        end = reached(*_after_jump(stages, step, after))
+        end = reached(*_after_jump(stages, step))
     while True:
         leaves = end.leaves(stages.growth.continues)
         if end.joins is not None:
@@ -242,7 +242,7 @@ def _after_meeting(stages: Stages, reached: Reached,
     return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 
 
-def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepResult, Solved]:
+def _after_jump(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
     """Return the state just after a jump of the scene's tables at the end of a step."""
     after, jumped = settle(stages, *stages.grading.solve(step.pore))
     remeshed = step.remeshed or after.mesh.topology is not step.pore.mesh.topology

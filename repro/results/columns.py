@@ -135,12 +135,6 @@ def _growth(scene: Scene, at: Report) -> float:
     return net_growth(at.solved.problem, at.pore, at.solved.concentrations, scene.kinetics)
 
 
-def _gap(k: int, scene: Scene, at: Report) -> float | None:
-    outlines = at.pore.outlines
-    others = (other for number, other in enumerate(outlines) if number != k)
-    return min((outlines[k].film(other)[0] for other in others), default=None)
-
-
 def _composition(index: int, scene: Scene, at: Report) -> float:
     return at.pore.composition(scene.kinetics.maximum_density)[index]
 
@@ -298,7 +292,10 @@ BODY = (
                  0.0 if at.pore.bodies[k].spans else at.pore.outlines[k].gap(at.pore.mesh.walls)),
              "film", "aggregate"),
     Quantity("aggregate_NAME_gap_um", "distance from another aggregate",
-             "least thickness of the fluid between it and another one", _gap, "gap", "aggregate"),
+             "least thickness of the fluid between it and another one", lambda k, scene, at: min(
+                 (at.pore.outlines[k].film(other)[0]
+                  for number, other in enumerate(at.pore.outlines) if number != k), default=None),
+             "gap", "aggregate"),
     *(Quantity(f"aggregate_NAME_{wall}_contact_um", f"contact with the {wall} wall",
                "length of its contact surface there",
                lambda k, scene, at, number=number: at.pore.outlines[k].contact_length(
@@ -395,9 +392,6 @@ DETACHED = Quantity("detached_pg_per_m", "detached biomass, which leaves in the 
                     lambda scene, step: step.detached, "detached")
 
 COLUMNS = [quantity.name for quantity in SERIES]
-#: Parts that a column of a ledger may need: does a scene have them?
-LEDGER_NEEDS: dict[str, Callable[..., bool]] = {
-    name: lambda scene, name=name: name in scene.substrates.modelled for name in SUBSTRATES}
 LEDGER_COLUMNS = [quantity.name for quantity in LEDGER]
 
 
@@ -416,5 +410,6 @@ def row(scene: Scene, instant: Report) -> dict[str, float | None]:
 
 def ledger_row(scene: Scene, ledger: Ledger) -> list[float | None]:
     """One row of ``ledger.csv``: a step's balances per metre of depth."""
-    return [quantity.reported(scene, ledger) if is_modelled(quantity, LEDGER_NEEDS, scene) else None
+    modelled = {"", *scene.substrates.modelled}
+    return [quantity.reported(scene, ledger) if quantity.needs in modelled else None
             for quantity in ledger_columns(scene)]

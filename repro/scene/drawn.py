@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 #: Largest file of a polygon (bytes), and mask (pixels): a microscope's camera has fewer.
 LARGEST, MOST_PIXELS = 10_000_000, 100_000_000
-#: The module of an optional package that reads masks.
-PILLOW = "PIL.Image"
 WALLS = {"lower": "y = 0 um", "upper": "y = pore.width"}
 
 
@@ -105,7 +103,7 @@ def _mask(drawn: Drawn, width: float) -> Shape:
     from shapely import box, unary_union
 
     try:
-        images = package(PILLOW, "pillow")
+        images = package("PIL.Image", "pillow")
     except ImportError as error:
         raise Refused(str(error)) from None
     with images.open(drawn.file, formats=["PNG"]) as image:

@@ -89,13 +89,19 @@ def _aggregate_rules(scene: "Scene", place: str, aggregate: "Aggregate") -> Rule
 
 def _pair_rules(scene: "Scene") -> Rules:
     """Rules of the distances between aggregates at t = 0."""
+    if len(scene.aggregates) < 2:
+        return
+    from shapely import Point, Polygon
+
     growth = scene.growth
     least = growth.minimum_film if growth else FINEST * scene.pore.width
     named = "growth.minimum_film" if growth else "a thousandth of pore.width"
-    bodies = [(place, *_extent(aggregate, scene.pore.width))
-              for place, aggregate in zip(scene.aggregate_keys, scene.aggregates)]
+    bodies = []
+    for place, aggregate in zip(scene.aggregate_keys, scene.aggregates):
+        points, reach = _extent(aggregate, scene.pore.width)
+        bodies.append((place, Polygon(points) if len(points) > 1 else Point(points), reach))
     for (one, near, reach), (other, far, extent) in combinations(bodies, 2):
-        gap = _distance(near, far) - reach - extent
+        gap = near.distance(far) - reach - extent
         distance = f"are {gap:.3g} um apart" if gap > 0 else "overlap or touch"
         requirement = f"{one} and {other} {distance}; {named} ({least:g} um) or more is needed"
         yield gap < least, {f"{place}.{key}": requirement for place in (other, one)
@@ -110,16 +116,6 @@ def _extent(aggregate: "Aggregate", width: float) -> tuple[Outlined, float]:
         level = 0.0 if aggregate.wall == "lower" else width
         return ((x, level),), aggregate.radius
     return tuple((x + each, y) for each, y in aggregate.outline), 0.0
-
-
-def _distance(one: Outlined, other: Outlined) -> float:
-    """Least distance (um) between points or polygons."""
-    if len(one) == len(other) == 1:
-        return math.dist(one[0], other[0])
-    from shapely import Point, Polygon
-
-    shapes = [Polygon(points) if len(points) > 1 else Point(points[0]) for points in (one, other)]
-    return shapes[0].distance(shapes[1])
 
 
 def _seed_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:

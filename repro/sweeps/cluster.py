@@ -19,7 +19,6 @@ from repro.sweeps import pool, single_run
 from repro.sweeps.design import Point
 from repro.sweeps.pool import EndedRuns, RunPoints
 
-PACKAGE = "distributed"
 #: Seconds to wait for the answer of a scheduler.
 ANSWER = 2
 #: Seconds to wait for the workers of a scheduler.
@@ -38,7 +37,10 @@ def ready(address: str) -> Iterator[RunPoints]:
     Raises OutputError within seconds, before anything is written, if no scheduler answers or the
     package ``distributed`` is not installed.
     """
-    distributed = _package(address)
+    try:
+        distributed = package("distributed")
+    except ImportError as error:
+        raise OutputError(f"--scheduler {address}: {error}") from None
     try:
         with ThreadPoolExecutor(1) as thread:  # a notebook has its own event loop in this one
             thread.submit(lambda: asyncio.run(_ask(distributed, address))).result()
@@ -47,13 +49,6 @@ def ready(address: str) -> Iterator[RunPoints]:
                           "such as tcp://host:8786 is needed") from error
     with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
         yield partial(run_points, client=client, address=address)
-
-
-def _package(address: str):
-    try:
-        return package(PACKAGE)
-    except ImportError as error:
-        raise OutputError(f"--scheduler {address}: {error}") from None
 
 
 async def _ask(distributed, address: str) -> None:

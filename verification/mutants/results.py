@@ -84,9 +84,9 @@ MUTANTS = (
         "repro/model/grading.py",
         ("graded-to-the-scene",
          "Finer elements at t = 0 restore the seeds of the scene.",
-         "Grading._as_seeded",
-         "return np.array_equal(seeds, pore.mesh.points)",
-         "return True",
+         "Grading.finer",
+         "np.array_equal(seeds, pore.mesh.points)",
+         "True",
          f"{SEVERAL}finer_elements_at_t_0_keep_the_shape_of_the_pore[True]",
          f"{SEVERAL}finer_elements_at_t_0_keep_the_shape_of_the_pore[False]")),
     *changes(
