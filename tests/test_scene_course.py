@@ -77,14 +77,17 @@ def test_every_key_that_takes_a_table_has_steps_or_changes_linearly(key):
 
 
 @pytest.mark.parametrize("key", TIMED)
-def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(key):
+@pytest.mark.parametrize("seeds", [
+    'aggregate={radius="20 um"}', 'aggregate=[{radius="20 um"}, {radius="20 um", position="60 um", wall="upper"}]'],
+    ids=["one", "two"])
+def test_the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump(seeds, key):
     """Two rows of one state, with the values before and after the jump, tell which columns jump. Bounds of substrates
     may be zero in both."""
     without, beside = DRIVEN_BY.get(key, ([], []))
     size = {"flow.mean_velocity": 1e5, "flow.rate": 5e7}.get(key, 5.0)
     table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", size), ("2 h", 2 * size))])
     loaded = load_scene("base", [f"{key}={table}", "growth.tensile_strength=1 MPa", "numerics.refinement=0.3",
-                                 "aggregate.radius=20 um", *beside], unset=without)
+                                 seeds, *beside], unset=without)
     seed = seeded(loaded)
     rows = []
     for time in (0.0, 2.0):

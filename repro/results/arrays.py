@@ -87,6 +87,8 @@ class Array(Quantity):
         As for :class:`Quantity`.
     yes_no, signed : bool
         As for :class:`Quantity`.
+    jumps : str
+        As for :class:`Quantity`.
     cells : bool
         True for a value per triangle, False for a value per node.
     body : bool

@@ -75,6 +75,10 @@ class Quantity:
         True if its values 1 and 0 mean yes and no.
     signed : bool
         True if it may be negative.
+    jumps : str
+        Parts of the scene whose tables over time make it jump: "flow", "flow and substrates"
+        without stored substrates, or "flow and forces" with the fluid's forces. Empty if it does
+        not jump.
 
     Examples
     --------
@@ -92,6 +96,7 @@ class Quantity:
     needs: str = ""
     yes_no: bool = False
     signed: bool = False
+    jumps: str = ""
 
     @property
     def unit(self) -> Unit:

@@ -2754,17 +2754,19 @@ MUTANTS = (
         ("forces-without-jumps",
          "Curves of the fluid's forces are straight across a jump of the flow.",
          "with_jumps",
-         "not DRIVEN.fullmatch(name)",
-         'not name.startswith(("mean", "head", "flow"))',
-         f"{COURSE}the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump[flow.head]"),
+         "quantity.jumps if quantity else ''",
+         'quantity.jumps if quantity and "force" not in name else ""',
+         f"{COURSE}the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump[one-flow.head]")),
+    *changes(
+        "repro/results/columns.py",
         ("jumps-of-one-substrate",
          "Only the donor's concentrations jump.",
-         "",
-         '"((effluent|inlet)_(acceptor|donor)|(acceptor|donor)_(min|overshoot))_mg_per_L|(acceptor_uptake|dono'
-         'r_uptake|biomass_growth)_(ug_per_m_per_h|pg_per_h)"',
-         '"((effluent|inlet)_acceptor|acceptor_(min|overshoot))_mg_per_L|(acceptor_uptake|donor_uptake|biomass'
-         '_growth)_(ug_per_m_per_h|pg_per_h)"',
-         f"{COURSE}the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump[flow.head]")),
+         "_both",
+         "Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name, name, signed=signed, "
+         "jumps=jumps)",
+         "Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name, name, signed=signed, "
+         "jumps=jumps if k else '')",
+         f"{COURSE}the_columns_that_a_table_changes_at_once_are_drawn_with_a_jump[one-flow.head]")),
     *changes(
         "repro/runs/execution.py",
         ("checkpoints-of-python",
