@@ -142,8 +142,9 @@ def _numbers(run: Run) -> str:
     rows = []
     for name, series in run.series.items():
         values = series[ends]
-        if name in names.YES_NO and np.isfinite(values).all():
-            rows.append([names.words(name), *map(page.format_value, (values == 1).tolist())])
+        quantity = names.known(name)
+        if quantity and quantity.yes_no and np.isfinite(values).all():
+            rows.append([quantity.words, *map(page.format_value, (values == 1).tolist())])
         elif name != "time_h" and np.isfinite(values).all():
             symbol, factor = names.readable_unit(name, [values])
             rows.append([names.with_unit(name, symbol),

@@ -141,11 +141,6 @@ def _composition(index: int, scene: Scene, at: Report) -> float:
     return at.pore.composition(scene.kinetics.maximum_density)[index]
 
 
-_BALANCE = ("(supplied - leaving - consumed - stored) / scale; the worst of the steps since the "
-            "last row and, except with Gear, of the row's own fluxes. scale: the largest of "
-            "supplied, consumed, 1e6 times the round-off and, with Gear, the content of the "
-            "meshed part at the supply")
-
 #: Columns of ``timeseries.csv``: value takes the scene and a Report.
 SERIES = (
     Quantity("time_h", "simulated time since the start of the run",
@@ -195,8 +190,11 @@ SERIES = (
     *_both("{}_overshoot_mg_per_L", "{} concentration above the supply",
            "largest C at the nodes - C_supply (with Gear: the largest of the table), at least zero",
            _overshoot, signed=False),
-    *_both("{}_balance", "relative defect of the {}'s balance", _BALANCE, _substrate_balance,
-           jumps=""),
+    *_both("{}_balance", "relative defect of the {}'s balance",
+           "(supplied - leaving - consumed - stored) / scale; the worst of the steps since the "
+           "last row and, except with Gear, of the row's own fluxes. scale: the largest of "
+           "supplied, consumed, 1e6 times the round-off and, with Gear, the content of the "
+           "meshed part at the supply", _substrate_balance, jumps=""),
     Quantity("biomass_balance", "relative defect of the biomass's balance",
              "(after - before - made) / after, the worst of the steps since the last row",
              lambda scene, at: _of_steps(balance.biomass, at), "biomass", "growth",
