@@ -140,13 +140,13 @@ def _seed_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
 
 
 #: An outline's wall in messages: y on it, the opposite wall, y on that, and accepted values of y.
-_SIDES = {"lower": ("y = 0 um", "upper wall", "y = pore.width", "0 < y <= pore.width ({})"),
-          "upper": ("y = pore.width", "lower wall", "y = 0", "0 <= y < pore.width ({})")}
+SIDES = {"lower": ("y = 0 um", "upper wall", "y = pore.width", "0 < y <= pore.width ({})"),
+         "upper": ("y = pore.width", "lower wall", "y = 0", "0 <= y < pore.width ({})")}
 
 
 def _shape_rules(key: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
     """Rules of an outline. ``points`` have their y from its own wall."""
-    own, wall, opposite, accepted = _SIDES[aggregate.wall]
+    own, wall, opposite, accepted = SIDES[aggregate.wall]
     width, half = pore.width, pore.length / 2
     drawn, _ = _extent(aggregate, width)
     points = tuple((x, y if aggregate.wall == "lower" else width - y) for x, y in drawn)

@@ -47,14 +47,14 @@ ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "pp
 MASSES = ("mg/L", "1/h")  # units of values that other models give in moles
 LONGEST = 80  # characters of a value with its unit
 MOST_POINTS = 1000  # of an outline
-_DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)?-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
 #: Signs of printed units, as a keyboard writes them.
 _PRINTED = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
                          "\u207b\u2212\u00b7\u22c5", "0123456789--**")
-_PERCENT = re.compile(rf"({_DIGITS}) *%")
-_QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
+_PERCENT = re.compile(rf"({DIGITS}) *%")
+_QUANTITY = re.compile(rf"({DIGITS}) *({_UNIT})")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
 _MOLES = re.compile(r"(?<![A-Za-z])(?:[num\u00b5\u03bc]|milli|micro|nano)?"
                     r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
@@ -133,7 +133,7 @@ class Quantity:
         endless = isinstance(value, int) and abs(value) >= 10**LONGEST
         if isinstance(value, bool) or endless:
             return ""
-        plain = isinstance(value, Real | str) and re.fullmatch(_DIGITS, f"{value}")
+        plain = isinstance(value, Real | str) and re.fullmatch(DIGITS, f"{value}")
         meant = f"{value} {self.usual_unit}" if plain else ""
         return f'"{meant}"' if _takes(self, meant) else ""
 
@@ -273,7 +273,7 @@ class Number(Plain):
     def near(self, value: object) -> str:
         """Suggest the number of a text that has no unit or one with a dimension."""
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
-        match = re.fullmatch(rf"({_DIGITS})(?: *({_UNIT}))?", text)
+        match = re.fullmatch(rf"({DIGITS})(?: *({_UNIT}))?", text)
         if match is None or not _takes(self, float(match[1])):
             return ""
         return "" if match[2] and _has_dimensionless_factor(match[2]) else match[1]
@@ -553,7 +553,7 @@ def _fault(value: object) -> str:
     odd = _ODD.search(value.translate(_PRINTED))
     if odd:
         return odd_character(odd[0])
-    start = re.match(_DIGITS, value)
+    start = re.match(DIGITS, value)
     if start is None:
         return "it does not start with a number"
     unit = value[start.end():].strip()
