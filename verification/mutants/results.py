@@ -873,14 +873,13 @@ MUTANTS = (
         ("list-leads-out",
          "Every path that run.json lists counts as a file of the run.",
          "list_written_files",
-         "names = {name for name in listed\n"
-         "         if name in (*RUN_FILES, *FORMER_FILES) or FIELDS.fullmatch(name)}",
+         "names = {name for name in listed if name in own or FIELDS.fullmatch(name)}",
          "names = {name for name in listed if name}",
          "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files"),
         ("former-files-stay",
          "The NetCDF file of a run of an earlier version stays beside the run that replaces it.",
          "list_written_files",
-         "name in (*RUN_FILES, *FORMER_FILES)",
+         "name in own",
          "name in RUN_FILES",
          "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files")),
     *changes(
