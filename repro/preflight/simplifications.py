@@ -16,7 +16,6 @@ from repro.model.meshing import (
     least_gap,
     resolution,
     walls_of,
-    whole_width_of,
 )
 from repro.model.pore import Pore
 from repro.model.surface import least_stretched
@@ -268,7 +267,7 @@ def _ends(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     if not (scene.flow or scene.substrates):
         return
     for reached in (numbers.at_start(scene), sizes):
-        free = min(10 * reached.thickness, 1.5 * whole_width_of(scene))
+        free = min(10 * reached.thickness, 1.5 * scene.pore.whole_width)
         if reached.reach + free > scene.pore.length / 2:
             when = f"at t = {reached.time:.3g} h" if reached.time else "from the start"
             stops = ", and the run ends if the aggregate reaches one of them"

@@ -255,6 +255,12 @@ class Substrates:
         return {name: substrate for name, substrate in pair.items() if substrate is not None}
 
     @property
+    def slowest(self) -> float:
+        """The smallest diffusivity (um^2/h)."""
+        return min(min(kind.diffusivity, kind.diffusivity_in_aggregate)
+                   for kind in self.modelled.values())
+
+    @property
     def places(self) -> slice:
         """The places of the substrates in (acceptor, donor)."""
         return slice(int(self.acceptor is None), 1 + int(self.donor is not None))
