@@ -16,7 +16,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import Seat, Wall, Walls, channel_walls
+from repro.fem.walls import Seat, Walls, channel_walls
 from repro.model.body import Body
 from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
@@ -46,11 +46,6 @@ def walls_of(scene: Scene) -> Walls:
     """The walls of a scene's pore."""
     bonded = bool(scene.growth and scene.growth.bonded)
     return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
-
-
-def seat_of(seed: Aggregate, walls: Walls) -> Wall:
-    """The wall of a seed."""
-    return walls[("lower", "upper").index(seed.wall)]
 
 
 def film(scene: Scene) -> float:
@@ -201,7 +196,7 @@ class Seeding:
         numerics = self.meshing.numerics
         sizes = self.meshing.sizes
         geometry = numerics.scheme.order
-        wall = seat_of(seed, sizes.walls)
+        wall = sizes.walls[("lower", "upper").index(seed.wall)]
         if seed.radius is None:
             points = np.array(seed.outline) + [seed.position, 0.0]
             return polygon(points, Seat(wall.number).walls(sizes.walls), geometry, seed.smooth,

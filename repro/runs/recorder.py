@@ -37,7 +37,6 @@ from repro.runs.folder import (
 from repro.runs.history import (
     COUNTS,
     History,
-    fields_name,
     require_fields,
     restore_history,
 )
@@ -146,7 +145,7 @@ class Recorder:
                 *of_growth]
 
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
-        name = fields_name(kind, len(index))
+        name = f"fields/{kind}_{len(index):04d}.vtu"
         path = claim(self.folder, name, self.run_files)
         with file_errors(path), atomic_path(path) as beside:
             field_files.write(beside, results.fields(self.scene, pore, solved))
