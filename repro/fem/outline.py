@@ -80,6 +80,13 @@ class Outline:
         """(M,) True at the nodes of a weld; weld: its number."""
         return self.wall - touched(self.wall) == weld
 
+    def free_walk(self, node: int, direction: int) -> np.ndarray:
+        """Nodes from the end of a contact surface or of a weld over the free surface to the next
+        one; direction: 1 or -1, along the loop."""
+        count = len(self.points)
+        walk = (node + direction * np.arange(count)) % count
+        return walk[: 2 + np.flatnonzero(self.wall[walk[1:]] != FREE)[0]]
+
     def nearest(self, wall: Wall) -> tuple[float, float]:
         """Least thickness (um) of the film at a wall, and x (um) of its thinnest point."""
         points = self._extreme_points

@@ -14,7 +14,7 @@ import numpy as np
 from repro.errors import GrowthError
 from repro.fem.outline import Outline
 from repro.fem.walls import FREE, Walls, touched
-from repro.model.contact_lines import free_walk, outward_sign, surface_ends, would_enclose
+from repro.model.contact_lines import outward_sign, surface_ends, would_enclose
 from repro.model.mechanics import CONTACT_ROUNDS, Closing, Expansion, equilibrium, with_new_surfaces
 
 
@@ -79,7 +79,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
 
     gap: (M,) um; step: 1 or -1, direction along the outline; slope: tangent of the least angle.
     """
-    _, *free, other = free_walk(outline, line, step)
+    _, *free, other = outline.free_walk(line, step)
     walk = np.array(free, int)
     x = outline.points[:, 0]
     gaps = gap[walk]
