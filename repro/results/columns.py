@@ -41,7 +41,7 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
              or scene.growth.tensile_strength is not None))}
 
 
-def _both(pattern: str, words: str, formula: str, value: Callable,
+def _both(pattern: str, words: str, formula: str, value: Callable, *,
           signed: bool = True, jumps: str = AT_REST) -> list[Quantity]:
     """A quantity for each of acceptor and donor, whose names replace {} in the texts."""
     return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
