@@ -11,7 +11,7 @@ TABLES = {
     "Columns of each aggregate in these tables if there are several": BODY,
     "Columns of `ledger.csv`, a row a step": (*LEDGER, DETACHED),
     "Arrays of the `.vtu` files": ARRAYS,
-    "Further quantities on pages": DERIVED,
+    "Further quantities on pages": DERIVED.values(),
     "Counts and times in `run.json`": COUNTS,
     "Columns of a sweep's `runs.csv`": NUMBERS,
 }

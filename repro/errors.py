@@ -23,6 +23,11 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
+def shortened(text: str, longest: int = 60) -> str:
+    """Shorten a text in a message to at most ``longest`` characters."""
+    return text if len(text) <= longest else text[:longest - 3] + "..."
+
+
 def shell_word(path: object) -> str:
     """Write a path as a word of a command: in quotes if necessary, and never an option."""
     text = str(path)

@@ -199,7 +199,10 @@ def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
     """(Mesh, refined outline) with the extent of 3.1; straight or curved like the outline."""
     ends = sizing.meshed_extent(around, width, LENGTH) if ends is None else ends
     sizes = Sizing(channel_walls(width), refinement, film)
-    return mesher.generate(around, ends, sizes, around.geometry if around else 1)
+    if around is None:
+        return mesher.generate_around([], ends, sizes)[0], None
+    mesh, (refined,) = mesher.generate_around([around], ends, sizes, around.geometry)
+    return mesh, refined
 
 
 def bent_inside(grid, by=0.2):

@@ -165,14 +165,14 @@ def test_a_spline_that_is_no_outline_is_refused_before_anything_is_written(tmp_p
 def test_check_estimates_a_large_mesh_instead_of_making_it(monkeypatch):
     """Above 20 000 nodes check estimates their number, and its report states this."""
     counts = []
-    generate = mesher.generate
+    generate = mesher.generate_around
 
     def counted(*arguments):
-        mesh, outline = generate(*arguments)
+        mesh, outlines = generate(*arguments)
         counts.append(len(mesh.points))
-        return mesh, outline
+        return mesh, outlines
 
-    monkeypatch.setattr(mesher, "generate", counted)
+    monkeypatch.setattr(mesher, "generate_around", counted)
     fine = load_scene("base", ['numerics.preset="paper"', "numerics.refinement=8", "growth.end=0.2 h"])
     report = check(fine)
     assert report.estimated and f"about {report.nodes} nodes" in str(report)

@@ -8,7 +8,6 @@ from repro import results
 from repro.errors import OriginFolded
 from repro.fem import transfer
 from repro.march import simulation
-from repro.preflight.simplifications import ORIGIN
 from repro.results.arrays import fields
 from repro.runs.state_arrays import pack_state, unpack_state
 from repro.scene import load_scene
@@ -70,7 +69,7 @@ def test_strain_that_counts_from_the_start_needs_its_positions(preset, folded):
 def test_the_record_says_from_when_on_fields_are_left_out(folded, tmp_path):
     folded()
     repro.run(scene("paper"), tmp_path / "run")
-    texts = [each["text"] for each in read_record(tmp_path / "run")["warnings"] if each["key"] == ORIGIN]
+    texts = [each["text"] for each in read_record(tmp_path / "run")["warnings"] if each["key"] == "position_t0_um"]
     assert len(texts) == 1 and "from t = " in texts[0] and (tmp_path / "run" / "report.html").exists()
     run = repro.load_run(tmp_path / "run")
     with pytest.raises(KeyError, match="displacement: this run has no such column or field"):

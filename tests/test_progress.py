@@ -59,8 +59,7 @@ def test_errors_are_json_objects(tmp_path, capsys, monkeypatch, sets, status):
 
 def test_lines_without_a_terminal_report_each_tenth_and_quiet_only_errors(tmp_path, capsys, monkeypatch):
     """The last line goes to standard output. The lines do not depend on the speed of the machine."""
-    for name in ("SILENCE", "LONGEST"):
-        monkeypatch.setattr(progress, name, 1000.0)
+    monkeypatch.setattr(progress, "SILENCE", 1000.0)
     folder = run(tmp_path, "base", 'growth.end="0.6 h"')
     expected = "".join(f"{time} of 0.6 h simulated\n" for time in ("0.2", "0.4", "0.6"))
     assert capsys.readouterr() == (f"base: completed; results in {folder}\n", expected)
@@ -75,9 +74,9 @@ STEP = {"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2
 
 def test_a_long_step_is_not_silent(capsys, monkeypatch):
     """Without a terminal, lines during a long step are at most two seconds apart."""
-    assert progress.LONGEST + progress.TICK <= 2.0
+    assert progress.SILENCE + progress.TICK <= 2.0
     monkeypatch.setattr(progress, "TICK", 0.01)
-    monkeypatch.setattr(progress, "LONGEST", 0.02)
+    monkeypatch.setattr(progress, "SILENCE", 0.02)
     with progress.in_lines() as tell:
         tell(STEP)
         lines, deadline = "", time.monotonic() + 20

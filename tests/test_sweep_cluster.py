@@ -71,7 +71,7 @@ def test_unusable_workers_are_reported(tmp_path, capsys, monkeypatch, trouble, a
 
     client = MagicMock(wait_for_workers=Mock(side_effect=trouble), run=run)
     client.__enter__.return_value = client
-    monkeypatch.setattr(cluster, "_package", lambda address: Mock(Client=lambda *at, **options: client))
+    monkeypatch.setattr(cluster, "package", lambda name: Mock(Client=lambda *at, **options: client))
     monkeypatch.setattr(cluster, "_ask", AsyncMock())
     assert expected in refused(tmp_path / "sweep", "tcp://host:8786", capsys)
 

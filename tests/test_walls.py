@@ -44,7 +44,7 @@ def test_a_seed_on_either_wall_has_the_same_boundary_sizes_and_mesh(order, on):
     sizes = Sizing(walls, 0.5, 2.0)
     points, _ = sizing.size_sources(seed, sizes)
     assert np.count_nonzero(other.holds(points)) == np.count_nonzero(seed.wall == FREE)
-    mesh, split = mesher.generate(seed, sizing.meshed_extent(seed, WIDTH, 600.0), sizes, order)
+    mesh, (split,) = mesher.generate_around([seed], sizing.meshed_extent(seed, WIDTH, 600.0), sizes, order)
     assert mesh.area() == pytest.approx(seed.area, rel=1e-9)
     assert mesh.areas.sum() == pytest.approx(WIDTH * np.diff(mesh.ends)[0], rel=1e-3)
     radius = np.hypot(*(split.origin - [3.0, on.y])[split.wall == FREE].T)

@@ -5,6 +5,7 @@ import io
 import json
 import re
 from contextlib import redirect_stdout
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
@@ -120,8 +121,9 @@ def test_check_reports_first_steps_that_miss_the_tolerance(capsys, sets, count):
 
 def test_the_worst_step_that_misses_the_tolerance_is_reported(tmp_path):
     recorder = execution.Recorder(load_scene("base", ["numerics.tolerance=0.01"]), tmp_path)
-    for estimate in (0.03, 0.5, 0.04, 0.001):
-        recorder._count_missed_tolerance(StepControl(1.0, 1.0, estimate))
+    for estimate in (0.0, 0.03, 0.5, 0.04, 0.001):
+        recorder.add(SimpleNamespace(step_control=StepControl(1.0, 1.0, estimate), missing=(), ledgers=(),
+                                     pore=SimpleNamespace(contact=False)), None)
     assert recorder.history.missed == 3 and not recorder.contact
     assert "errs by 0.5 (estimate)" in recorder.warnings_so_far()[0].text
 

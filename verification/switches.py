@@ -248,5 +248,5 @@ def uneven(scene: Scene, bulge: float) -> Pore:
     """The pore at t = 0 with a seed of radius R (1 + bulge cos 3 phi), phi from downstream."""
     (seed,) = meshing.initial_outlines(scene)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
-    pore_parts = Meshing.of(scene).generate(replace(seed, points=points, origin=points.copy()))
-    return aggregates.seed_on(*pore_parts)
+    mesh, (outline,) = Meshing.of(scene).around([replace(seed, points=points, origin=points.copy())])
+    return aggregates.seed_on(mesh, outline)

@@ -7,8 +7,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from repro.errors import shortened
+
 Class = TypeVar("Class", bound=type)
-LONGEST = 40  # characters of a value
 
 
 def brief(kind: Class) -> Class:
@@ -26,5 +27,5 @@ def _short_repr(instance: Any) -> str:
 def _short(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"
-    text = type(value).__name__ if hasattr(value, "__dataclass_fields__") else repr(value)
-    return text if len(text) <= LONGEST else f"{type(value).__name__} of {len(text)} characters"
+    is_part = hasattr(value, "__dataclass_fields__")
+    return shortened(type(value).__name__ if is_part else repr(value), 40)

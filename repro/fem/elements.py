@@ -119,8 +119,8 @@ class Curved(Element):
         for _ in range(NEWTON_STEPS):
             guess = local[rest]
             corners = nodes[rest]
-            values, gradients = evaluated(2, guess)
-            offset = (values[:, None] @ corners)[:, 0] - where[rest]
+            functions, gradients = evaluated(2, guess)
+            offset = (functions[:, None] @ corners)[:, 0] - where[rest]
             J = np.swapaxes(corners, 1, 2) @ gradients
             det = determinant(J)
             det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
@@ -131,7 +131,7 @@ class Curved(Element):
             rest = rest[np.abs(step).max(axis=1) >= CLOSE]
             if len(rest) == 0:
                 break
-        offset = np.einsum("ka,kai->ki", evaluated(2, local)[0], nodes) - where
+        offset = np.einsum("ka,kai->ki", values(2, local), nodes) - where
         lost = np.hypot(*offset.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
         return np.where(lost[:, None], 99.0, local)
 

@@ -412,7 +412,7 @@ class Mesh:
 
     def area(self) -> float:
         """Area of the aggregates, um2."""
-        of = elements.table(self.geometry, elements.ELEMENTS[self.geometry].degree)
+        of = elements.table(self.geometry, self.element.degree)
         return float(elements.weights(self.points[self.cells[self.biomass]], of).sum())
 
     def with_middles(self, field: np.ndarray) -> np.ndarray:

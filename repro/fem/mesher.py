@@ -45,18 +45,6 @@ Polygon: TypeAlias = tuple[np.ndarray, int]
 Regions: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
-             geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
-    """Generate a mesh around one aggregate, or of a clean channel (outline None).
-
-    Also returns the outline with the mesh's nodes. Arguments and errors are those of
-    :func:`generate_around`.
-    """
-    mesh, outlines = generate_around([] if outline is None else [outline], ends, sizing, geometry,
-                                     method)
-    return mesh, next(iter(outlines), None)
-
-
 @timed("meshing")
 def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizing: Sizing,
                     geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, list[Outline]]:

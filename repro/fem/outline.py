@@ -80,6 +80,13 @@ class Outline:
         """(M,) True at the nodes of a weld; weld: its number."""
         return self.wall - touched(self.wall) == weld
 
+    def free_walk(self, node: int, direction: int) -> np.ndarray:
+        """Nodes from the end of a contact surface or of a weld over the free surface to the next
+        one; direction: 1 or -1, along the loop."""
+        count = len(self.points)
+        walk = (node + direction * np.arange(count)) % count
+        return walk[: 2 + np.flatnonzero(self.wall[walk[1:]] != FREE)[0]]
+
     def nearest(self, wall: Wall) -> tuple[float, float]:
         """Least thickness (um) of the film at a wall, and x (um) of its thinnest point."""
         points = self._extreme_points
@@ -117,7 +124,10 @@ class Outline:
         on_wall = np.flatnonzero(self.wall != FREE)[0]
         ring = np.roll(ring, -on_wall * (len(ring) // len(self.points)), axis=0)
         film, middle = inf, np.zeros(2)
-        if not _faces_itself(ring):
+        # Two points face each other across water that is wider behind them only if the line turns
+        # to the right, where the water is, by more than half a turn.
+        turned = np.unwrap(np.arctan2(*np.diff(ring, axis=0).T[::-1]))
+        if (np.maximum.accumulate(turned) - turned).max() <= np.pi:
             return film, middle
         line = shapely.LineString(ring)
         for pocket in shapely.Polygon(ring).buffer(thick / 2, quad_segs=ON_ARC).interiors:
@@ -226,15 +236,6 @@ class Outline:
         t = (-0.5 * along[arc, axis] / bend[arc, axis])[:, None]
         peaks = m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
         return np.concatenate([peaks, self.points])
-
-
-def _faces_itself(points: np.ndarray) -> bool:
-    """Does a line (K, 2), with the water on its right, turn to the right by more than half a turn?
-
-    Only then do two of its points face each other across water that is wider behind them.
-    """
-    turned = np.unwrap(np.arctan2(*np.diff(points, axis=0).T[::-1]))
-    return bool((np.maximum.accumulate(turned) - turned).max() > np.pi)
 
 
 def polygon_area(points: np.ndarray) -> float:

@@ -70,7 +70,7 @@ class Space:
     @cached_property
     def table(self) -> Table:
         """The functions at the quadrature points for products."""
-        return elements.table(self.order, elements.ELEMENTS[self.order].degree)
+        return elements.table(self.order, self.mesh.element.degree)
 
     @cached_property
     def at(self) -> Basis:
@@ -80,7 +80,7 @@ class Space:
     @property
     def gradient_degree(self) -> int:
         """Degree of the quadrature for gradients; straight triangles need one point."""
-        return elements.ELEMENTS[self.order].gradient_degree
+        return self.mesh.element.gradient_degree
 
     @cached_property
     def gradient_table(self) -> Table:
@@ -298,7 +298,7 @@ class Quadrature:
         space = self.space
         mesh = space.mesh
         biomass = mesh.biomass
-        of = elements.table(space.order, elements.ELEMENTS[space.order].degree + degrees)
+        of = elements.table(space.order, mesh.element.degree + degrees)
         dx = elements.weights(mesh.points[mesh.cells[biomass]], of)
         fit = elements.linear_fit(space.table).T @ of.linear.T
         return Basis(space.cells[biomass], space.count, of.values, dx), fit

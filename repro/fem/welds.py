@@ -138,10 +138,8 @@ def notches(first: Outline, second: Outline) -> list[tuple[np.ndarray, np.ndarra
 
 def _free_from(outline: Outline, node: int, direction: int) -> np.ndarray:
     """The node, and the free nodes after it in a direction along the loop, up to a corner."""
-    count = len(outline.points)
-    walk = (node + direction * np.arange(count)) % count
-    free = 1 + int(np.flatnonzero(outline.wall[walk[1:]] != FREE)[0])
-    return walk[: free - (free - 1) % outline.geometry]
+    walk = outline.free_walk(node, direction)[:-1]
+    return walk[: len(walk) - (len(walk) - 1) % outline.geometry]
 
 
 def lengths_from(outline: Outline, walk: np.ndarray) -> np.ndarray:

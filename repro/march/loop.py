@@ -168,7 +168,7 @@ def _grow(course: Course, state: RestartState,
         detached = len(step.pore.bodies) < len(pore.bodies)
         state = _after_step(state, step, solved, control)
         pore = replace(state.pore, concentrations=solved.concentrations)
-        row = _row_time_at(course.rows, pore.time)
+        row = next((row for row in course.rows if abs(row - pore.time) <= SAME_TIME), None)
         if course.every_step or row is not None or detached or event.margin > 0:
             reported = pore if row is None else replace(pore, time=row)
             report = make_report(state, reported, solved, step.before, shown)
@@ -207,7 +207,7 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
         end = locate(shorter, pore.time, margin, end)
         end = replace(end, step=replace(end.step, within=step.within))
     elif stages.tables.jumps(step.pore.time):
-        end = reached(*_after_jump(stages, step, after))
+        end = reached(*_after_jump(stages, step))
     while True:
         leaves = end.leaves(stages.growth.continues)
         if end.joins is not None:
@@ -242,7 +242,7 @@ def _after_meeting(stages: Stages, reached: Reached,
     return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 
 
-def _after_jump(stages: Stages, step: StepResult, solved: Solved) -> tuple[StepResult, Solved]:
+def _after_jump(stages: Stages, step: StepResult) -> tuple[StepResult, Solved]:
     """Return the state just after a jump of the scene's tables at the end of a step."""
     after, jumped = settle(stages, *stages.grading.solve(step.pore))
     remeshed = step.remeshed or after.mesh.topology is not step.pore.mesh.topology
@@ -265,11 +265,6 @@ def row_times(stepping: Stepping, scene: Scene) -> tuple[float, ...]:
     """Return the times (h) of rows after t = 0, ascending: output.times, or the scheme's times."""
     requested = scene.requested_times
     return stepping.rows(scene.growing.growth) if requested is None else requested
-
-
-def _row_time_at(rows: tuple[float, ...], time: float) -> float | None:
-    """Exact time (h) of the row at which a step ends; None if it ends at no row."""
-    return next((row for row in rows if abs(row - time) <= SAME_TIME), None)
 
 
 def _after_step(state: RestartState, step: StepResult, solved: Solved,

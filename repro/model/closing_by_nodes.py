@@ -14,7 +14,7 @@ import numpy as np
 from repro.errors import GrowthError
 from repro.fem.outline import Outline
 from repro.fem.walls import FREE, Walls, touched
-from repro.model.contact_lines import free_walk, surface_ends, would_enclose
+from repro.model.contact_lines import outward_sign, surface_ends, would_enclose
 from repro.model.mechanics import CONTACT_ROUNDS, Closing, Expansion, equilibrium, with_new_surfaces
 
 
@@ -79,7 +79,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
 
     gap: (M,) um; step: 1 or -1, direction along the outline; slope: tangent of the least angle.
     """
-    _, *free, other = free_walk(outline, line, step)
+    _, *free, other = outline.free_walk(line, step)
     walk = np.array(free, int)
     x = outline.points[:, 0]
     gaps = gap[walk]
@@ -88,7 +88,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
     if touched(outline.wall[other]) != touched(outline.wall[line]):
         nearer = np.ones(len(walk), bool)
-    along = np.sign(x[line] - x[(line - step) % len(x)]) * apart
+    along = outward_sign(outline, line, step) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     behind = would_enclose(np.append(0.0, along), np.append(0.0, gaps), film, tolerance)[1:]
     thin &= ~np.logical_or.accumulate(behind)

@@ -147,7 +147,7 @@ class Clearance:
             without such a point.
         """
         arcs, last = _free_arcs(outline, node, direction)
-        outwards = np.sign(outline.points[node, 0] - outline.points[node - direction, 0])
+        outwards = outward_sign(outline, node, direction)
         wall = numbered(self.walls, outline.wall[node])
         # Elsewhere the clearance is AMPLE. An arc lies within its control points.
         ends = wall.film(arcs[:, [0, 2]])
@@ -235,12 +235,20 @@ def surface_beyond(outline: Outline, wall: Wall, node: int,
     node, direction: of the line, as :func:`surface_ends` returns them.
     """
     if outline.geometry == 1:
-        points = outline.points[free_walk(outline, node, direction)]
+        points = outline.points[outline.free_walk(node, direction)]
     else:
         points = (AT_PLACES @ _free_arcs(outline, node, direction)[0]).reshape(-1, 2)
-    line = outline.points[node, 0]
-    outwards = np.sign(line - outline.points[(node - direction) % len(outline.points), 0])
-    return outwards * (points[:, 0] - line), wall.film(points), points
+    along = outward_sign(outline, node, direction) * (points[:, 0] - outline.points[node, 0])
+    return along, wall.film(points), points
+
+
+def outward_sign(outline: Outline, node: int, direction: int) -> float:
+    """1 or -1, the sign of x away from a contact surface at its end.
+
+    node, direction: of the end, as :func:`surface_ends` returns them.
+    """
+    inside = (node - direction) % len(outline.points)
+    return float(np.sign(outline.points[node, 0] - outline.points[inside, 0]))
 
 
 def second_contacts(outline: Outline, walls: Walls, least: float,
@@ -251,7 +259,7 @@ def second_contacts(outline: Outline, walls: Walls, least: float,
         for node, direction in surface_ends(outline, wall.number):
             along, film, points = surface_beyond(outline, wall, node, direction)
             behind = would_enclose(along, film, least, tolerance)
-            last = free_walk(outline, node, direction)[-1]
+            last = outline.free_walk(node, direction)[-1]
             if outline.touches(wall.number)[last]:  # points belong to the nearer line
                 behind &= along <= np.abs(points[:, 0] - outline.points[last, 0])
             if behind.any():
@@ -259,17 +267,10 @@ def second_contacts(outline: Outline, walls: Walls, least: float,
                 yield wall, float(film[thinnest]), points[thinnest]
 
 
-def free_walk(outline: Outline, node: int, direction: int) -> np.ndarray:
-    """Nodes from a contact line over the free surface to the next contact surface or weld."""
-    count = len(outline.points)
-    walk = (node + direction * np.arange(count)) % count
-    return walk[: 2 + np.flatnonzero(outline.wall[walk[1:]] != FREE)[0]]
-
-
 def _free_arcs(outline: Outline, node: int, direction: int) -> tuple[np.ndarray, int]:
     """(K, 3, 2) um, nodes of the free arcs beyond a contact line, from the line on; and the index
     of the last node."""
-    walk = free_walk(outline, node, direction)
+    walk = outline.free_walk(node, direction)
     nodes = outline.points[walk]
     return np.stack([nodes[:-2:2], nodes[1:-1:2], nodes[2::2]], axis=1), int(walk[-1])
 

@@ -407,7 +407,10 @@ def _corrected(system: System, level: Level, step: float,
     biomass_rise[0] += interval * growth
     rise = level.biomass[0] + biomass_rise[0]
     biomass_rise[1] += interval * system.active * np.exp(rise) * remains
-    flux[:, 3] = _unmet(system, system.active * np.exp(rise), fields)
+    law = system.problem.law
+    if law is not None:
+        fractions = law.uptake_law.fraction(system.space.reaction.evaluate(fields))
+        flux[:, 3] = Sink(system.active * np.exp(rise)).unmet(fractions, law)
     flow_rise = carry * level.flow_rise + interval * flux
     new = Level(fields, level.biomass + biomass_rise, level.flows + flow_rise, field_rise,
                 biomass_rise, flow_rise, step)
@@ -426,14 +429,6 @@ def _rates(system: System, fields: np.ndarray) -> tuple[Rate, Rate]:
         return 0.0, 0.0
     values = system.space.reaction.evaluate(fields)
     return problem.law.growth_rate(*values), problem.law.inert_rate(*values)
-
-
-def _unmet(system: System, active: np.ndarray, fields: np.ndarray) -> np.ndarray:
-    """(2,) um2 mg/L/h, the unmet demand of acceptor and donor."""
-    law = system.problem.law
-    if law is None:
-        return np.zeros(2)
-    return Sink(active).unmet(law.uptake_law.fraction(system.space.reaction.evaluate(fields)), law)
 
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,

@@ -58,21 +58,16 @@ class Grading:
         front = 2 * pore.front
         if not self.solver.scheme.follows_layers or front > MOST_GRADED:
             return None
-        if pore.time == 0 and self._as_seeded(pore):
-            return self.seeding.pore(front)
-        if pore.time == 0 and self.remeshing is None:
-            return self.seeding.around(pore.outlines, front)
+        if pore.time == 0:
+            # Outlines from elsewhere, or moved by the water, are not the seeds of the scene.
+            seeds = self.seeding.pore(pore.front).mesh.points
+            if np.array_equal(seeds, pore.mesh.points):
+                return self.seeding.pore(front)
+            if self.remeshing is None:
+                return self.seeding.around(pore.outlines, front)
         from repro.model.remeshing import remesh
         rules = needed(self.remeshing, "[growth]")
         return remesh(rules, pore, replace(pore, front=front), 0.0)[0]
-
-    def _as_seeded(self, pore: Pore) -> bool:
-        """Does a pore have the unmoved seeds of the scene?
-
-        Otherwise it has outlines from elsewhere, or fluid forces have deformed its aggregates.
-        """
-        seeds = self.seeding.pore(pore.front).mesh.points
-        return np.array_equal(seeds, pore.mesh.points)
 
 
 def solve_graded(scene: Scene, pore: Pore) -> tuple[Pore, Solved]:

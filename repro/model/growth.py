@@ -36,7 +36,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from repro.errors import GrowthError, LinearError, failing_as
-from repro.fem.assembly import ElementSystem, Factored, Supported, saddle_blocks
+from repro.fem.assembly import Factored, Supported, saddle_blocks
 from repro.fem.forms import Basis, each, product
 from repro.fem.mesh import gradients, triangle_areas
 from repro.fem.newton import Newton, relative
@@ -226,20 +226,17 @@ class System:
 
     def __init__(self, solid: Solid, constrained: np.ndarray, *,
                  stabilisation: PressureGradient | GradDiv = GradDiv(),
-                 forces: np.ndarray | None = None, supports: Sequence[Support] = (),
-                 system: ElementSystem | None = None):
+                 forces: np.ndarray | None = None, supports: Sequence[Support] = ()):
         """constrained: (n, 2) True where a coordinate is prescribed; forces: (n, 2) um, nodal
         forces over mu_L that do not depend on the shape (t0 in (20)), none by default; supports: of
-        the contact surfaces, at points with prescribed x; system: the sparse system without
-        constraints, if known."""
+        the contact surfaces, at points with prescribed x."""
         self.solid = solid
         self.constrained = constrained
         self.supports = supports
         self.stabilisation = stabilisation
         none = np.zeros(solid.shape.corners, bool)
         rows = np.concatenate([constrained[:, 0], constrained[:, 1], none])
-        self.sparse = (solid.shape.constrained(rows) if system is None
-                       else system.with_constrained(rows))
+        self.sparse = solid.shape.constrained(rows)
         self.free = self.sparse.free
         self.pull = np.zeros(len(rows))
         if forces is not None:

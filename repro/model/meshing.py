@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
 from math import inf
-from typing import overload
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.fem.walls import Seat, Wall, Walls, channel_walls, whole_width
+from repro.fem.walls import Seat, Walls, channel_walls
 from repro.model.body import Body
 from repro.model.configuration import configuration_of
 from repro.model.energies import energy_of
@@ -47,16 +46,6 @@ def walls_of(scene: Scene) -> Walls:
     """The walls of a scene's pore."""
     bonded = bool(scene.growth and scene.growth.bonded)
     return channel_walls(scene.pore.width, bonded, scene.pore.upper_wall)
-
-
-def seat_of(seed: Aggregate, walls: Walls) -> Wall:
-    """The wall of a seed."""
-    return walls[("lower", "upper").index(seed.wall)]
-
-
-def whole_width_of(scene: Scene) -> float:
-    """Width (um) of a scene's pore: W, or 2 W if one wall is a plane of symmetry."""
-    return whole_width(walls_of(scene))
 
 
 def film(scene: Scene) -> float:
@@ -94,9 +83,7 @@ def _largest_peclet(scene: Scene) -> float:
 
 def peclet(substrates: Substrates, width: float, speed: float) -> float:
     """u W / D with the smallest diffusivity; width: W, um; speed: mean velocity u, um/h."""
-    slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
-                  for s in substrates.modelled.values())
-    return speed * width / slowest
+    return speed * width / substrates.slowest
 
 
 def thin_layers(scene: Scene) -> str:
@@ -117,8 +104,7 @@ def fastest(drive: Drive, channel: Channel) -> float:
     largest = at_largest(drive)
     if largest.mean_velocity is not None:
         return largest.mean_velocity
-    width = whole_width(channel_walls(channel.width, upper=channel.upper_wall))
-    loss = poiseuille_loss(channel.length, width)
+    loss = poiseuille_loss(channel.length, channel.whole_width)
     return largest.driving_head * drive.gravity / drive.kinematic_viscosity / loss
 
 
@@ -152,38 +138,6 @@ class Meshing:
     def of(cls, scene: Scene) -> Meshing:
         """The meshing of a scene."""
         return cls(scene.pore, sized(scene), scene.numerics)
-
-    @overload
-    def generate(self, outline: Outline, front: float = 1.0) -> tuple[Mesh, Outline]: ...
-
-    @overload
-    def generate(self, outline: Outline | None,
-                 front: float = 1.0) -> tuple[Mesh, Outline | None]: ...
-
-    def generate(self, outline: Outline | None,
-                 front: float = 1.0) -> tuple[Mesh, Outline | None]:
-        """Generate a mesh around an aggregate, with the extent of 3.1.
-
-        Parameters
-        ----------
-        outline : Outline, optional
-            Boundary of the aggregate; None for a clean channel.
-        front : float
-            As :attr:`Pore.front`.
-
-        Returns
-        -------
-        mesh : Mesh
-        outline : Outline, optional
-            The boundary with its nodes on that mesh.
-
-        Raises
-        ------
-        MeshError
-            If no mesh can be made.
-        """
-        mesh, outlines = self.around([] if outline is None else [outline], front)
-        return mesh, next(iter(outlines), None)
 
     def around(self, outlines: Sequence[Outline],
                front: float = 1.0) -> tuple[Mesh, list[Outline]]:
@@ -242,7 +196,7 @@ class Seeding:
         numerics = self.meshing.numerics
         sizes = self.meshing.sizes
         geometry = numerics.scheme.order
-        wall = seat_of(seed, sizes.walls)
+        wall = sizes.walls[("lower", "upper").index(seed.wall)]
         if seed.radius is None:
             points = np.array(seed.outline) + [seed.position, 0.0]
             return polygon(points, Seat(wall.number).walls(sizes.walls), geometry, seed.smooth,

@@ -99,7 +99,11 @@ class Solver:
             return Solved(carried, None, None)
         supplied = at_time(self.substrates, pore.time)
         if carried and not self.transport.stores:
-            refuse_no_supply(peclet(supplied, self.channel.width, carried.mean_velocity))
+            number = peclet(supplied, self.channel.width, carried.mean_velocity)
+            if number < SLOWEST:
+                raise TransportError(f"the Peclet number u W / D is {number:.2g}, under "
+                                     f"{SLOWEST:g}: nothing is supplied through the inlet; leave "
+                                     "[flow] out for pure diffusion")
         from repro.model import substrates  # a scene without [substrates] does not load them
         return Solved(carried, *substrates.solve(supplied, self.kinetics, self.scheme,
                                                  self.transport, pore, carried, over))
@@ -127,11 +131,3 @@ def solve(scene: Scene, pore: Pore, over: float = 0.0) -> Solved:
         If the flow or the substrates cannot be solved.
     """
     return Solver.of(scene).solve(pore, over)
-
-
-def refuse_no_supply(number: float) -> None:
-    """Raise TransportError if the Peclet number u W / D is too small: no state is steady."""
-    if number < SLOWEST:
-        raise TransportError(f"the Peclet number u W / D is {number:.2g}, under {SLOWEST:g}: "
-                             "nothing is supplied through the inlet; leave [flow] out for pure "
-                             "diffusion")

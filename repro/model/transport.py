@@ -38,7 +38,7 @@ from repro.model.flow import Flow
 from repro.model.kinetics import RateLaw, Sink, rate_law
 from repro.model.uptake_law import LARGEST_SATURATION, UptakeLaw
 from repro.scene import Kinetics, Substrate, Substrates, needed
-from repro.schemes import PAPER, Scheme
+from repro.schemes import PAPER, UNRESOLVED, Scheme
 from repro.timing import timed
 
 #: Newton's method stops at this residual relative to the size of its terms.
@@ -50,8 +50,6 @@ MOST_ITERATIONS = 60
 SATURATED = 0.9
 #: Above this saturation, uptake is linearised about the actual concentration.
 SWITCH = 0.5
-#: A concentration is not resolved if it is below zero by more than this part of its supply.
-UNRESOLVED = 1e-3
 #: The uptake is not resolved if its relative difference from a quadrature of a degree higher by
 #: FINER is above APART. Both quadratures use the same concentrations. In base with fronts of half
 #: saturations from 1e-1 to 1e-6 of the supply, the error of the biomass made in 2 h was at most a

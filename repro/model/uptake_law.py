@@ -153,12 +153,7 @@ class UptakeLaw:
         Returns
         -------
         float
-            The bound, without unit.
-
-        Raises
-        ------
-        NotImplementedError
-            If the subclass does not define it.
+            The bound, without unit; 1 if the subclass has no other one.
 
         Examples
         --------
@@ -166,7 +161,7 @@ class UptakeLaw:
         >>> Monod(half_saturation=1.0).largest(10.0)
         1.0
         """
-        raise NotImplementedError
+        return 1.0
 
     def saturates(self, supply: float) -> bool:
         """Return whether uptake is nearly independent of C at a supply.
@@ -179,12 +174,7 @@ class UptakeLaw:
         Returns
         -------
         bool
-            True if a small change of C hardly changes m.
-
-        Raises
-        ------
-        NotImplementedError
-            If the subclass does not define it.
+            True if a small change of C hardly changes m: above K, if the subclass does not differ.
 
         Examples
         --------
@@ -192,7 +182,7 @@ class UptakeLaw:
         >>> Monod(half_saturation=1.0).saturates(10.0)
         True
         """
-        raise NotImplementedError
+        return supply > self.half_saturation
 
     def extended(self, concentration: Values) -> tuple[Values, Values]:
         """Return m and dm/dC; below C = 0, m follows its tangent at zero."""
@@ -247,14 +237,6 @@ class Monod(UptakeLaw):
         """Return K / (C + K)^2, L/mg."""
         return self.half_saturation / (np.maximum(concentration, 0.0) + self.half_saturation) ** 2
 
-    def largest(self, supply: float) -> float:
-        """Return one, for any supply."""
-        return 1.0
-
-    def saturates(self, supply: float) -> bool:
-        """Return True for a supply above K."""
-        return supply > self.half_saturation
-
     def at_saturation(self, saturation: Values) -> tuple[Values, float]:
         """Return m = s and dm/ds = 1."""
         return saturation, 1.0
@@ -293,10 +275,6 @@ class Haldane(UptakeLaw):
     def largest(self, supply: float) -> float:
         """Return the maximum of m, for any supply."""
         return 1 / (1 + 2 * np.sqrt(self.half_saturation / self.inhibition))
-
-    def saturates(self, supply: float) -> bool:
-        """Return True for a supply above K."""
-        return supply > self.half_saturation
 
 
 class FirstOrder(UptakeLaw):
@@ -344,14 +322,6 @@ class ZeroOrder(UptakeLaw):
         """Return exp(-C / K) / K, L/mg."""
         decayed = np.exp(-np.maximum(concentration, 0.0) / self.half_saturation)
         return decayed / self.half_saturation
-
-    def largest(self, supply: float) -> float:
-        """Return one, for any supply."""
-        return 1.0
-
-    def saturates(self, supply: float) -> bool:
-        """Return True for a supply above K."""
-        return supply > self.half_saturation
 
 
 #: {value of `kinetics.law`: law}.

@@ -32,7 +32,6 @@ from repro.model.meshing import (
     resolution,
     sized,
     thin_layers,
-    whole_width_of,
 )
 from repro.scene import Aggregate, Scene, SceneError
 from repro.scene.rules import FINEST
@@ -63,7 +62,7 @@ def expected_nodes(scene: Scene) -> float:
 def first_nodes(scene: Scene) -> float:
     """Estimated nodes of the mesh at t = 0: around half-discs and outlines, or of a channel."""
     if not scene.aggregates:
-        return _nodes(scene, 3 * whole_width_of(scene), [])
+        return _nodes(scene, 3 * scene.pore.whole_width, [])
     firsts, lasts, surface = zip(*map(partial(_around, scene), scene.aggregates,
                                       initial_outlines(scene)))
     return _nodes(scene, max(lasts) - min(firsts), list(chain(*surface)))
@@ -73,7 +72,7 @@ def _around(scene: Scene, seed: Aggregate,
             outline: Outline) -> tuple[float, float, list[tuple[float, float]]]:
     """Ends (um) of a mesh around a seed, if the pore were endless; element size and length (um) of
     each piece of its surface."""
-    margin = min(10 * seed.height(scene.pore.width), 1.5 * whole_width_of(scene))
+    margin = min(10 * seed.height(scene.pore.width), 1.5 * scene.pore.whole_width)
     if seed.radius is None:
         pieces = _edges(outline.corners, sized(scene))
         return outline.upstream - margin, outline.downstream + margin, pieces

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from repro.fem.outline import Outline
 from repro.model.flow import MPA_PER_UM
 from repro.model.kinetics import rate_law
-from repro.model.meshing import Meshing, initial_outlines, least_gap, sized, whole_width_of
+from repro.model.meshing import Meshing, initial_outlines, least_gap, sized
 from repro.model.pore import Pore
 from repro.model.resistance import resistance_of
 from repro.model.uptake_law import UptakeLaw
@@ -133,13 +133,13 @@ def numbers(scene: Scene, speed: float | None, end: Sizes | None = None) -> list
     """
     computed: list[Number] = []
     if speed is not None:
-        reynolds = speed * whole_width_of(scene) / scene.flow.kinematic_viscosity
+        reynolds = speed * scene.pore.whole_width / scene.flow.kinematic_viscosity
         computed.append(Number("Reynolds", reynolds, None, "u W / nu"))
     if speed is not None and scene.substrates:
         for name, substrate in scene.substrates.modelled.items():
-            peclet = speed * whole_width_of(scene) / substrate.diffusivity
+            peclet = speed * scene.pore.whole_width / substrate.diffusivity
             computed.append(Number(f"Peclet, {name}", peclet, None, "u W / D, D in water"))
-        cell = 1.5 * speed * sized(scene).largest / slowest(scene)
+        cell = 1.5 * speed * sized(scene).largest / scene.substrates.slowest
         computed.append(Number("cell Peclet", cell, None,
                                "1.5 u h / D, h of the largest elements, the smallest D"))
     if scene.kinetics:
@@ -165,12 +165,6 @@ def evaluate_at_largest(scene: Scene, velocity: float | None,
     return most, numbers(most, velocity * rise, end)
 
 
-def slowest(scene: Scene) -> float:
-    """The smallest diffusivity (um2/h)."""
-    return min(min(kind.diffusivity, kind.diffusivity_in_aggregate)
-               for kind in scene.substrates.modelled.values())
-
-
 def _taken_up(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Number]:
     start = at_start(scene)
     for uptake in uptakes(scene):
@@ -189,10 +183,10 @@ def _taken_up(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[
 
 
 def _grown(scene: Scene, speed: float | None, end: Sizes | None) -> Iterator[Number]:
-    across = half_length(scene) if speed is None else whole_width_of(scene)
+    across = half_length(scene) if speed is None else scene.pore.whole_width
     length = "l half of the meshed part" if speed is None else "l = W"
     yield Number("transport over growth time",
-                 fastest_growth(scene) * across**2 / slowest(scene), None,
+                 fastest_growth(scene) * across**2 / scene.substrates.slowest, None,
                  f"(l^2 / D) F3 / X_A, {length}")
     if speed:
         passed = scene.pore.length / speed
@@ -219,7 +213,7 @@ def stresses(scene: Scene, speed: float, end: Sizes | None) -> tuple[float, floa
     """
     drive = scene.flow
     width = scene.pore.width
-    whole = whole_width_of(scene)
+    whole = scene.pore.whole_width
     modulus = scene.growth.shear_modulus
     viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / modulus
     shear = 6 * viscosity * speed / whole

@@ -33,8 +33,6 @@ FACTOR = 1.5
 FACTORS = {"refinement": FACTOR, "tolerance": FACTOR**-2, "contact_elements": FACTOR}
 #: Intervals between rows, if the scene requests no times.
 INTERVALS = 24
-#: Digits of the times (h) of common rows.
-DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -224,7 +222,7 @@ class _Run:
     def _advance(self, scene: Scene) -> Iterator[None]:
         for state, row in steps(scene):
             if row:
-                self.rows[round(row.pore.time, DIGITS)] = results.row(scene, row)
+                self.rows[row.pore.time] = results.row(scene, row)
             self.time = state.pore.time
             yield
 

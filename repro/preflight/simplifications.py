@@ -16,7 +16,6 @@ from repro.model.meshing import (
     least_gap,
     resolution,
     walls_of,
-    whole_width_of,
 )
 from repro.model.pore import Pore
 from repro.model.surface import least_stretched
@@ -34,14 +33,15 @@ REYNOLDS = 0.1
 #: Linear elements may overshoot where a concentration changes within an element of a cell Peclet
 #: number above this.
 CELL_PECLET = 2.0
-#: Largest ratio of the time of transport to that of growth for quasi-steady substrates.
+#: Largest ratio of the time of transport, or of the transit of water, to the time of growth for
+#: profiles at rest in each shape. In base, a seed of 20 um in a pore full of the supply makes 0.5,
+#: 2, 4, 7 and 19 % less biomass in 6 h than with Gear's method at ratios of the transit of 0.009,
+#: 0.027, 0.05, 0.09 and 0.28.
 LAG = 0.05
-#: Largest ratio of the transit time of water to the time of growth for profiles at rest in each
-#: shape. In base, a seed of 20 um in a pore full of the supply makes 0.5, 2, 4, 7 and 19 % less
-#: biomass in 6 h than with Gear's method at ratios of 0.009, 0.027, 0.05, 0.09 and 0.28.
-TRANSIT = 0.05
-#: Largest strain of the aggregate, roughly, due to the neglected forces.
-STRAIN = 0.01
+#: Largest relative error by one simplification, roughly: the strain of the aggregate by neglected
+#: forces; the flow through the narrowest film, and the uptake of a layer, by elements that widen a
+#: layer of the flow or a front.
+ERROR = 0.01
 #: Drag on a half-cylinder on a wall in shear flow, over the wall's shear and the radius: 6.73 in
 #: reference/half_cylinder.py, for a radius much smaller than the pore's width.
 DRAG = 6.73
@@ -51,16 +51,6 @@ GROWTH_IN_A_STEP = 0.1
 #: With fewer distances between nodes across a film, its flow (the cube of its thickness) depends on
 #: the mesh.
 ACROSS_FILM = 4.0
-#: The flow through the narrowest film may be too small by this share if elements do not resolve the
-#: layer in which a permeable aggregate slows the water. The water slips on this layer: the flow
-#: through a film of thickness h beside a layer l is at most 1 + 3 l / h times that beside a wall.
-FILM_LOSS = 0.01
-#: The uptake of a layer may be too small by this share if elements widen its front.
-FRONT_LOSS = 0.01
-#: The key in the warning of a crease.
-CREASED = "growth.new_biomass"
-#: The field that a warning names if positions at t = 0 fold.
-ORIGIN = "position_t0_um"
 
 
 @dataclass(frozen=True)
@@ -156,9 +146,9 @@ def _lag(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 
 def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     transit = computed.get("transit over growth time")  # not of water that stands still
-    if transit and transit.start > TRANSIT:
+    if transit and transit.start > LAG:
         yield Caveat("flow", f"water takes {transit.start:.2g} of the time of growth to pass the "
-                     f"pore, above {TRANSIT:g}: steady profiles in each shape (3.3.2) ignore the "
+                     f"pore, above {LAG:g}: steady profiles in each shape (3.3.2) ignore the "
                      "substrates that the pore contained before, so the biomass may err by this "
                      "fraction")
 
@@ -166,11 +156,11 @@ def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 def _forces(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     stress = computed["fluid stress over modulus"]
     strain = max(stress.start, stress.end or 0.0)
-    if not scene.growth.has_fluid_forces and strain > STRAIN:
+    if not scene.growth.has_fluid_forces and strain > ERROR:
         stressed = scene.growth.new_biomass == "stressed"
         setting = '"included"' + ("" if stressed else ' with growth.new_biomass = "stressed"')
         yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
-                     f"above {STRAIN:g}: it strains the aggregate by about this fraction, and the "
+                     f"above {ERROR:g}: it strains the aggregate by about this fraction, and the "
                      f"scene neglects it (2.3.3); {setting} models it")
 
 
@@ -190,9 +180,9 @@ def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
         return
     stress = computed["fluid stress over modulus"]
     force = DRAG * stress.start + (stress.end or 0.0)
-    if force > STRAIN:
+    if force > ERROR:
         yield Caveat("growth.wall", f"the water's force reaches {force:.2g} of mu_L times the "
-                     f"aggregate's thickness, above {STRAIN:g}: a sliding aggregate is kept in "
+                     f"aggregate's thickness, above {ERROR:g}: a sliding aggregate is kept in "
                      "place by a traction of an assumed distribution, and its shape depends "
                      'on it by about this fraction; growth.wall = "bonded" computes the traction')
 
@@ -207,11 +197,11 @@ def _fronts(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     for uptake in numbers.uptakes(scene):
         layer, depth = uptake.layer, uptake.depth
         lost = (front / depth) ** 2 if uptake.law.sharp and depth else 0.0
-        if lost > FRONT_LOSS:
+        if lost > ERROR:
             yield Caveat("numerics.refinement", f"elements widen the front behind which there is "
                          f"no {uptake.name} to {front:.2g} um, of {depth:.2g} um that the supply "
                          f"reaches: uptake may be {100 * lost:.2g} % too small"
-                         + _resolving(resolution(scene) * (lost / FRONT_LOSS) ** 0.5))
+                         + _resolving(resolution(scene) * (lost / ERROR) ** 0.5))
         elif not uptake.law.sharp and layer < min(nodes, thickness):
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
@@ -228,14 +218,19 @@ def _interface_size(scene: Scene, thickness: float) -> float:
 
 
 def _drag_layer(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn if elements widen the layer in which a permeable aggregate slows the water.
+
+    The water slips on this layer: the flow through a film of thickness h beside a layer l is at
+    most 1 + 3 l / h times that beside a wall.
+    """
     permeability = scene.flow.permeability
     root = math.sqrt(permeability)
     size = _interface_size(scene, sizes.thickness)
     thickness = size / ACROSS
     gap = max(scene.pore.width - sizes.thickness, least_gap(scene))
     loss = 3 * (root - permeability / thickness) / gap
-    if loss > FILM_LOSS:
-        accepted = root / (1 - FILM_LOSS * gap / (3 * root))
+    if loss > ERROR:
+        accepted = root / (1 - ERROR * gap / (3 * root))
         yield Caveat("flow.permeability", f"the flow fades in the aggregate over the root of "
                      f"the permeability, {root:.2g} um, which elements of {size:.2g} um widen to "
                      f"{thickness:.2g} um: the flow through the narrowest film, {gap:.2g} um, may "
@@ -272,7 +267,7 @@ def _ends(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     if not (scene.flow or scene.substrates):
         return
     for reached in (numbers.at_start(scene), sizes):
-        free = min(10 * reached.thickness, 1.5 * whole_width_of(scene))
+        free = min(10 * reached.thickness, 1.5 * scene.pore.whole_width)
         if reached.reach + free > scene.pore.length / 2:
             when = f"at t = {reached.time:.3g} h" if reached.time else "from the start"
             stops = ", and the run ends if the aggregate reaches one of them"
@@ -315,9 +310,9 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
     if not pore.bodies:
         return
     if not all(body.origin_known for body in pore.bodies):
-        yield Caveat(ORIGIN, f"from t = {pore.time:.4g} h on the positions at t = 0 fold: fields "
-                     "have no displacement, position at t = 0, theta and J; nothing else depends "
-                     'on them with growth.new_biomass = "stress_free"')
+        yield Caveat("position_t0_um", f"from t = {pore.time:.4g} h on the positions at t = 0 "
+                     "fold: fields have no displacement, position at t = 0, theta and J; nothing "
+                     'else depends on them with growth.new_biomass = "stress_free"')
     limit = pore.bodies[0].solid.energy.crease
     if limit is None:
         return
@@ -325,8 +320,8 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
     if crease.least >= limit:
         return
     x, y = crease.place
-    yield Caveat(CREASED, f"from t = {pore.time:.4g} h on growth compresses the aggregate's "
-                 f"surface near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of "
+    yield Caveat("growth.new_biomass", f"from t = {pore.time:.4g} h on growth compresses the "
+                 f"aggregate's surface near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of "
                  f"{crease.least:.3f}, below {limit:g}: a crease there would lower the energy, "
                  "and only a surface without flaws stays smooth; "
                  '"stress_free" avoids this')

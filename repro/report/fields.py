@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+from skfem import MeshTri
 
 from repro.errors import OutputError
 from repro.fem.transfer import located
@@ -121,12 +122,9 @@ def _as_drawn(grid: Grid) -> Grid:
 
 def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) points of a regular grid over a box, and (t, 3) its triangles."""
-    size = np.sqrt(np.prod(high - low) / MOST_NODES)
-    along, across = np.maximum(2, ((high - low) / size).astype(int))
-    x, y = np.meshgrid(np.linspace(low[0], high[0], along), np.linspace(low[1], high[1], across))
-    corner = np.arange(along * across).reshape(across, along)[:-1, :-1].ravel()
-    halves = np.array([[0, 1, along + 1], [0, along + 1, along]])
-    return np.column_stack([x.ravel(), y.ravel()]), (corner[:, None, None] + halves).reshape(-1, 3)
+    counts = np.maximum(2, (high - low) / np.sqrt(np.prod(high - low) / MOST_NODES)).astype(int)
+    mesh = MeshTri.init_tensor(*map(np.linspace, low, high, counts))
+    return mesh.p.T, mesh.t.T
 
 
 def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict],

@@ -68,8 +68,9 @@ def mean_rates(start: np.ndarray, end: np.ndarray, amounts: np.ndarray) -> TimeS
     return np.column_stack([start, end]).ravel(), np.repeat(rates, 2)
 
 
-#: Quantities besides the columns of the time series; ``value`` maps a run to a TimeSeries.
-DERIVED = (
+#: Quantities besides the columns of the time series, by their names; ``value`` maps a run to a
+#: TimeSeries.
+DERIVED = {each.name: each for each in (
     *(Quantity(f"{name}_{part}_ug_per_m_per_h", f"{name} {label} in an hour",
                f"{name}_{part}_pg_per_m / (end_h - start_h), from the start to the end of the step",
                lambda run, column=f"{name}_{part}_pg_per_m": mean_rates(
@@ -84,8 +85,7 @@ DERIVED = (
              "sum of biomass_made_pg_per_m up to the step's end",
              lambda run: (run.ledger["end_h"], np.cumsum(run.ledger["biomass_made_pg_per_m"])),
              "made since t = 0", signed=True),
-)
-DERIVED_BY_NAME = {each.name: each for each in DERIVED}
+)}
 
 
 def _pair(pattern: str) -> tuple[str, ...]:
@@ -138,7 +138,7 @@ def series(run: Run) -> dict[str, TimeSeries]:
     """
     drawable = {name: with_jumps(name, run.times, values, run.record["tables"])
                 for name, values in run.series.items()}
-    for quantity in DERIVED if len(run.ledger.get("end_h", ())) else ():
+    for quantity in DERIVED.values() if len(run.ledger.get("end_h", ())) else ():
         times, values = quantity.value(run)
         drawable[quantity.name] = times, quantity.unit.factor * values
     return {name: (times, values) for name, (times, values) in drawable.items()
@@ -167,7 +167,7 @@ def charts_of(run: Run) -> list[Chart]:
 
 def _named(name: str) -> Quantity:
     """Return the quantity of a name; an unknown name is its own words."""
-    return (DERIVED_BY_NAME.get(name) or names.known(name)
+    return (DERIVED.get(name) or names.known(name)
             or Quantity(name, names.words(name), "", None, names.words(name)))
 
 

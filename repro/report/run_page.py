@@ -15,8 +15,6 @@ from repro.scene import SceneError
 OWN_PLACE = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
         "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
-NESTED = ("A stage includes the time of those that it calls, such as factorising and solving, so "
-          "the sum of the stages exceeds the total time.")
 #: Colours of a field. Neighbours cannot be told apart.
 BANDS = 128
 
@@ -144,8 +142,9 @@ def _numbers(run: Run) -> str:
     rows = []
     for name, series in run.series.items():
         values = series[ends]
-        if name in names.YES_NO and np.isfinite(values).all():
-            rows.append([names.words(name), *map(page.format_value, (values == 1).tolist())])
+        quantity = names.known(name)
+        if quantity and quantity.yes_no and np.isfinite(values).all():
+            rows.append([quantity.words, *map(page.format_value, (values == 1).tolist())])
         elif name != "time_h" and np.isfinite(values).all():
             symbol, factor = names.readable_unit(name, [values])
             rows.append([names.with_unit(name, symbol),
@@ -169,7 +168,9 @@ def _cost(run: Run) -> str:
     stages = sorted(((seconds, name) for name, seconds in record["wall_time_by_stage_s"].items()
                      if seconds > 0), reverse=True)
     times = page.table("", [], [(name, f"{seconds:.3g} s") for seconds, name in stages])
-    note = times and f'<p class="note">{NESTED}</p>'
+    note = times and ('<p class="note">A stage includes the time of those that it calls, such as '
+                      "factorising and solving, so the sum of the stages exceeds the total time."
+                      "</p>")
     return page.section("Cost", total_text, times, note, page.table("", [], counts))
 
 

@@ -87,6 +87,8 @@ class Array(Quantity):
         As for :class:`Quantity`.
     yes_no, signed : bool
         As for :class:`Quantity`.
+    jumps : str
+        As for :class:`Quantity`.
     cells : bool
         True for a value per triangle, False for a value per node.
     body : bool
@@ -135,11 +137,6 @@ def _density(name: str, state: State) -> np.ndarray:
     return space.integration.to_nodes(getattr(state.pore, name) / full)
 
 
-def _displacement(state: State) -> np.ndarray:
-    mesh = state.pore.mesh
-    return mesh.points[mesh.body] - state.pore.origin[mesh.body]
-
-
 def _pressure(state: State) -> np.ndarray:
     mesh = state.pore.mesh
     return state.scene.growth.shear_modulus * mesh.with_middles(state.pore.pressure)[mesh.body]
@@ -180,8 +177,9 @@ ARRAYS = (
           partial(_density, "active"), needs="biomass", signed=True),
     Array("inert_biomass", "inert biomass over X_m", f"X_I / X_m: {_FITTED}; zero in the fluid",
           partial(_density, "inert"), needs="biomass", signed=True),
-    Array("displacement_um", "displacement since t = 0", "x - X", _displacement, needs=ORIGIN,
-          body=True, signed=True),
+    Array("displacement_um", "displacement since t = 0", "x - X",
+          lambda state: (state.pore.mesh.points - state.pore.origin)[state.pore.mesh.body],
+          needs=ORIGIN, body=True, signed=True),
     Array("position_t0_um", "position at t = 0", "X, where the material was",
           lambda state: state.pore.origin[state.pore.mesh.body], needs=ORIGIN, body=True,
           signed=True),

@@ -16,6 +16,8 @@ from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Scene
 
 SUBSTRATES = ("acceptor", "donor")
+#: What makes a quantity of substrates at rest jump.
+AT_REST = "flow and substrates"
 
 
 def _solved(name: str, scene: Scene, at: Report) -> bool:
@@ -39,11 +41,11 @@ NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
              or scene.growth.tensile_strength is not None))}
 
 
-def _both(pattern: str, words: str, formula: str, value: Callable,
-          signed: bool = True) -> list[Quantity]:
+def _both(pattern: str, words: str, formula: str, value: Callable, *,
+          signed: bool = True, jumps: str = AT_REST) -> list[Quantity]:
     """A quantity for each of acceptor and donor, whose names replace {} in the texts."""
     return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
-                     name, signed=signed) for k, name in enumerate(SUBSTRATES)]
+                     name, signed=signed, jumps=jumps) for k, name in enumerate(SUBSTRATES)]
 
 
 def _least(k: int, scene: Scene, at: Report) -> float:
@@ -89,7 +91,7 @@ def _peak(name: str, words: str, formula: str, label: str, peak: Callable) -> li
     """The largest mean of a stress, and its place; peak: takes the arguments of a column's value.
     """
     return [Quantity(f"{name}_MPa", words, formula, lambda *of: peak(*of).value, label, "adhesion",
-                     signed=True),
+                     signed=True, jumps="flow and forces"),
             *(Quantity(f"{name}_{axis}_um", f"place of the {words}, {axis}",
                        f"middle of the part whose mean is the {words}",
                        lambda *of, axis=axis: getattr(peak(*of), axis),
@@ -135,29 +137,9 @@ def _growth(scene: Scene, at: Report) -> float:
     return net_growth(at.solved.problem, at.pore, at.solved.concentrations, scene.kinetics)
 
 
-def _film(k: int, scene: Scene, at: Report) -> float:
-    spans = at.pore.bodies[k].spans
-    return 0.0 if spans else at.pore.outlines[k].gap(at.pore.mesh.walls)
-
-
-def _gap(k: int, scene: Scene, at: Report) -> float | None:
-    outlines = at.pore.outlines
-    others = (other for number, other in enumerate(outlines) if number != k)
-    return min((outlines[k].film(other)[0] for other in others), default=None)
-
-
-def _contact_length(wall: int, k: int, scene: Scene, at: Report) -> float:
-    return at.pore.outlines[k].contact_length(numbered(at.pore.mesh.walls, wall))
-
-
 def _composition(index: int, scene: Scene, at: Report) -> float:
     return at.pore.composition(scene.kinetics.maximum_density)[index]
 
-
-_BALANCE = ("(supplied - leaving - consumed - stored) / scale; the worst of the steps since the "
-            "last row and, except with Gear, of the row's own fluxes. scale: the largest of "
-            "supplied, consumed, 1e6 times the round-off and, with Gear, the content of the "
-            "meshed part at the supply")
 
 #: Columns of ``timeseries.csv``: value takes the scene and a Report.
 SERIES = (
@@ -165,11 +147,11 @@ SERIES = (
              "t; a row at a jump of a table has the state just after it, in all columns",
              lambda scene, at: at.pore.time, "time"),
     Quantity("mean_velocity_m_per_d", "mean velocity", "u_ave: flow through a cross-section / W",
-             lambda scene, at: at.solved.flow.mean_velocity, "mean velocity", "flow"),
+             lambda scene, at: at.solved.flow.mean_velocity, "mean velocity", "flow", jumps="flow"),
     Quantity("head_loss_cm", "head loss over the whole pore",
              "loss of the meshed part (6) + 12 nu u_ave / (g W^2) times the length outside of it, "
              "with 2 W up to a plane of symmetry",
-             lambda scene, at: at.solved.flow.head_loss, "head loss", "flow"),
+             lambda scene, at: at.solved.flow.head_loss, "head loss", "flow", jumps="flow"),
     Quantity("conductivity_m_per_d", "hydraulic conductivity of the pore",
              "u_ave L / head loss, of the whole pore",
              lambda scene, at: at.solved.flow.conductivity, "conductivity", "flow"),
@@ -208,7 +190,11 @@ SERIES = (
     *_both("{}_overshoot_mg_per_L", "{} concentration above the supply",
            "largest C at the nodes - C_supply (with Gear: the largest of the table), at least zero",
            _overshoot, signed=False),
-    *_both("{}_balance", "relative defect of the {}'s balance", _BALANCE, _substrate_balance),
+    *_both("{}_balance", "relative defect of the {}'s balance",
+           "(supplied - leaving - consumed - stored) / scale; the worst of the steps since the "
+           "last row and, except with Gear, of the row's own fluxes. scale: the largest of "
+           "supplied, consumed, 1e6 times the round-off and, with Gear, the content of the "
+           "meshed part at the supply", _substrate_balance, jumps=""),
     Quantity("biomass_balance", "relative defect of the biomass's balance",
              "(after - before - made) / after, the worst of the steps since the last row",
              lambda scene, at: _of_steps(balance.biomass, at), "biomass", "growth",
@@ -241,12 +227,14 @@ SERIES = (
     *(Quantity(f"fluid_force_{axis}_uN_per_m", f"force of the fluid on the aggregate, {axis}",
                "integral of the water's stress over the interface, or of its drag over a permeable "
                "aggregate; the head is zero at the outlet of the meshed part",
-               _all(partial(_load, axis), sum), f"force {axis}", "adhesion and flow", signed=True)
+               _all(partial(_load, axis), sum), f"force {axis}", "adhesion and flow", signed=True,
+               jumps="flow")
       for axis in "xy"),
     Quantity("fluid_moment_nN", "moment of the fluid on the aggregate, per depth",
              "integral of x f_y - y f_x from the middle of the contact with its wall; of several, "
              "the sum",
-             _all(partial(_load, "moment"), sum), "moment", "adhesion and flow", signed=True),
+             _all(partial(_load, "moment"), sum), "moment", "adhesion and flow", signed=True,
+             jumps="flow"),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
              lambda scene, at: len(at.pore.mesh.points), "nodes"),
     Quantity("remeshed", "new mesh", "1 if a new mesh was generated since the last row, else 0",
@@ -260,11 +248,12 @@ SERIES = (
 RATES = (
     *(Quantity(f"{name}_uptake_ug_per_m_per_h", f"uptake of the {name}",
                "integral of (7)-(8) over the aggregates, at the present concentrations",
-               _all(partial(_uptake, k), sum), f"{name} uptake", f"{name} and biomass", signed=True)
+               _all(partial(_uptake, k), sum), f"{name} uptake", f"{name} and biomass", signed=True,
+               jumps=AT_REST)
       for k, name in enumerate(SUBSTRATES)),
     Quantity("biomass_growth_ug_per_m_per_h", "net growth of the biomass",
              "integral of (9) + (10) over the aggregates, at the present concentrations",
-             _growth, "net growth", "biomass and substrates", signed=True),
+             _growth, "net growth", "biomass and substrates", signed=True, jumps=AT_REST),
 )
 
 def _total(name: str, of: Quantity) -> Quantity:
@@ -282,7 +271,7 @@ TOTALS = (
              "u_ave W pore.depth, of the whole pore: with 2 W up to a plane of symmetry",
              lambda scene, at: (scene.pore.depth * scene.pore.whole_width
                                 * _PER_DEPTH["mean_velocity_m_per_d"].value(scene, at)),
-             "flow rate", "flow"),
+             "flow rate", "flow", jumps="flow"),
     _total("aggregate_volume_um3", _PER_DEPTH["aggregate_area_um2"]),
     *(_total(f"{name}_pg_per_h", _PER_DEPTH[f"{name}_ug_per_m_per_h"])
       for name in (*(f"{substrate}_uptake" for substrate in SUBSTRATES), "biomass_growth")),
@@ -303,18 +292,25 @@ BODY = (
       for end, extreme in (("upstream", "smallest"), ("downstream", "largest"))),
     Quantity("aggregate_NAME_film_um", "thinnest film",
              "least thickness of the fluid between it and a wall that it does not touch; zero if "
-             "it touches both", _film, "film", "aggregate"),
+             "it touches both", lambda k, scene, at: (
+                 0.0 if at.pore.bodies[k].spans else at.pore.outlines[k].gap(at.pore.mesh.walls)),
+             "film", "aggregate"),
     Quantity("aggregate_NAME_gap_um", "distance from another aggregate",
-             "least thickness of the fluid between it and another one", _gap, "gap", "aggregate"),
+             "least thickness of the fluid between it and another one", lambda k, scene, at: min(
+                 (at.pore.outlines[k].film(other)[0]
+                  for number, other in enumerate(at.pore.outlines) if number != k), default=None),
+             "gap", "aggregate"),
     *(Quantity(f"aggregate_NAME_{wall}_contact_um", f"contact with the {wall} wall",
-               "length of its contact surface there", partial(_contact_length, number),
+               "length of its contact surface there",
+               lambda k, scene, at, number=number: at.pore.outlines[k].contact_length(
+                   numbered(at.pore.mesh.walls, number)),
                f"{wall} contact", "aggregate")
       for wall, number in (("lower", BOTTOM), ("upper", TOP))),
     Quantity("aggregate_NAME_biomass_pg_per_m", "biomass", "integral of X_A + X_I",
              lambda k, scene, at: at.pore.bodies[k].mass, "biomass", "biomass"),
     *(Quantity(f"aggregate_NAME_{name}_uptake_ug_per_m_per_h", f"uptake of the {name}",
                "integral of (7)-(8) over it, at the present concentrations", partial(_uptake, k),
-               f"{name} uptake", f"{name} and biomass", signed=True)
+               f"{name} uptake", f"{name} and biomass", signed=True, jumps=AT_REST)
       for k, name in enumerate(SUBSTRATES)),
     Quantity("aggregate_NAME_eroded_ug_per_m_per_h", "erosion",
              "X_m times the integral of the speed of erosion over its free surface, in the present "
@@ -330,7 +326,7 @@ BODY = (
            lambda k, *of: _adhesion("tensile_peaks", *of)[k]),
     *(Quantity(f"aggregate_NAME_fluid_force_{axis}_uN_per_m", f"force of the fluid, {axis}",
                f"as fluid_force_{axis}_uN_per_m", partial(_load, axis), f"force {axis}",
-               "adhesion and flow", signed=True) for axis in "xy"),
+               "adhesion and flow", signed=True, jumps="flow") for axis in "xy"),
 )
 
 
@@ -400,9 +396,6 @@ DETACHED = Quantity("detached_pg_per_m", "detached biomass, which leaves in the 
                     lambda scene, step: step.detached, "detached")
 
 COLUMNS = [quantity.name for quantity in SERIES]
-#: Parts that a column of a ledger may need: does a scene have them?
-LEDGER_NEEDS: dict[str, Callable[..., bool]] = {
-    name: lambda scene, name=name: name in scene.substrates.modelled for name in SUBSTRATES}
 LEDGER_COLUMNS = [quantity.name for quantity in LEDGER]
 
 
@@ -421,5 +414,6 @@ def row(scene: Scene, instant: Report) -> dict[str, float | None]:
 
 def ledger_row(scene: Scene, ledger: Ledger) -> list[float | None]:
     """One row of ``ledger.csv``: a step's balances per metre of depth."""
-    return [quantity.reported(scene, ledger) if is_modelled(quantity, LEDGER_NEEDS, scene) else None
+    modelled = {"", *scene.substrates.modelled}
+    return [quantity.reported(scene, ledger) if quantity.needs in modelled else None
             for quantity in ledger_columns(scene)]

@@ -33,9 +33,6 @@ WIDTH, PANEL, ROOM = 7.0, 1.9, 1.2
 FRAME, RESOLUTION = 120, 110
 #: Dots per inch of a picture in a notebook.
 SMALL = 80
-#: ffmpeg's filter for sides of an even number of pixels, which the format of colours needs.
-EVEN = "pad=ceil(iw/2)*2:ceil(ih/2)*2"
-OUTLINE = "#d7191c"
 PYPLOT = "matplotlib.pyplot"
 #: Nodes of the straight triangles that draw a triangle, by its number of nodes.
 PARTS = {3: [[0, 1, 2]], 6: [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]}
@@ -175,7 +172,7 @@ def field(fields: Mapping[str, np.ndarray], name: str, title: str, ax: Any = Non
     image.set_clim(*limits)
     edges, shared = outlines.boundary(cells, fields["region"] > 0.5)
     lines = outlines.curved(fields["places_um"][edges[shared]])
-    _add_lines(ax, lines, colors=OUTLINE, capstyle="round")
+    _add_lines(ax, lines, colors="#d7191c", capstyle="round")
     bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.02, 0, 0.02, 1]))
     if not style.log:
         bar.formatter.set_powerlimits((-3, 4))
@@ -327,7 +324,8 @@ def _write_mp4(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any) -> A
     writer = optional("matplotlib.animation").FFMpegWriter
     if not writer.isAvailable():
         raise ImportError("the program ffmpeg is not installed; a film as .gif needs none")
-    films = writer(fps=1000 / FRAME, extra_args=["-pix_fmt", "yuv420p", "-vf", EVEN])
+    even = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # sides, which the format of colours needs
+    films = writer(fps=1000 / FRAME, extra_args=["-pix_fmt", "yuv420p", "-vf", even])
     for number, last in enumerate(frames(ax)):
         if number == 0:
             films.setup(last.figure, file, RESOLUTION)

@@ -53,16 +53,11 @@ def write(path: Path, grid: Grid) -> None:
     in_cells = {name: [values] for name, values in grid.cell_data.items()}
     mesh = meshio.Mesh(grid.points, cells, dict(grid.point_data), in_cells)
     meshio.vtu.write(path, mesh, header_type="UInt32")
-    _add_time(path, grid.time)
-
-
-def _add_time(path: Path, time: float) -> None:
-    """Add the time (h) to a file; meshio reads field data and does not write them."""
-    tree = ElementTree.parse(path)
+    tree = ElementTree.parse(path)  # meshio reads field data, such as the time, and writes none
     fields = ElementTree.Element("FieldData")
     value = ElementTree.SubElement(fields, "DataArray", type="Float64", Name=TIME,
                                    NumberOfTuples="1", format="ascii")
-    value.text = repr(float(time))
+    value.text = repr(float(grid.time))
     tree.getroot()[0].insert(0, fields)
     tree.write(path, encoding="utf-8", xml_declaration=True)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from repro.results.arrays import ARRAYS
 from repro.results.columns import BODY, DETACHED, LEDGER, RATES, SERIES, TOTALS, of_body
-from repro.results.quantities import SMALLER, Quantity, ending, unit_of
+from repro.results.quantities import Quantity, ending, unit_of
 
 #: Every column and array by its name.
 KNOWN: dict[str, Quantity] = {quantity.name: quantity
@@ -14,12 +14,9 @@ KNOWN: dict[str, Quantity] = {quantity.name: quantity
                                                *ARRAYS)}
 #: Ends of the columns that are coordinates. A percentage of one has no meaning.
 COORDINATES = ("stream_um", "_x_um", "_y_um")
-#: Pure numbers that stand for yes (1) and no (0).
-YES_NO = {name for name, quantity in KNOWN.items() if quantity.yes_no}
-#: Relative defects of balances.
-DEFECTS = {name for name in KNOWN if name.endswith("_balance")}
-#: Columns without a value between rows, and defects, which are round-off.
-NOT_COMPARED = {"time_h", "nodes", *DEFECTS, *YES_NO}
+#: Columns without a value between rows, and relative defects of balances, which are round-off.
+NOT_COMPARED = {"time_h", "nodes", *(name for name, quantity in KNOWN.items()
+                                     if quantity.yes_no or name.endswith("_balance"))}
 #: The columns that answer what becomes of a pore.
 ANSWER = ("conductivity_m_per_d", "aggregate_area_um2", "thickness_um",
           "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
@@ -74,7 +71,7 @@ def readable_unit(name: str, values: Iterable[np.ndarray]) -> tuple[str, float]:
     """
     largest = max((float(np.nanmax(np.abs(each))) for each in values if np.isfinite(each).any()),
                   default=0.0)
-    units = ((unit(name), 1.0), *SMALLER.get(ending(name), ()))
+    units = ((unit(name), 1.0), *unit_of(name).smaller)
     if not largest:
         return units[0]
     return next((each for each in units if largest * each[1] >= 1), units[-1])

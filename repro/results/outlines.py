@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from repro.fem.elements import ON_ARC
+from repro.fem.elements import ON_ARC, element_of
 from repro.fem.outline import parabola, polygon_area
 
 if TYPE_CHECKING:
     from shapely import Polygon
 
-#: Nodes along each edge of a triangle, by its number of nodes.
-EDGES = {3: [[0, 1], [1, 2], [2, 0]], 6: [[0, 3, 1], [1, 4, 2], [2, 5, 0]]}
 #: A node this close to its wall, over the width of the pore, is on it: round-off.
 ON_WALL = 1e-9
 
@@ -77,7 +75,7 @@ def curved(edges: np.ndarray) -> np.ndarray:
 def boundary(cells: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (e, 2 or 3) of the edges between triangles ``inside`` (T,) and no other of them, and
     (e,) whether a triangle outside shares each."""
-    edges = cells[:, EDGES[cells.shape[1]]]
+    edges = cells[:, element_of(cells).sides]
     owned = np.repeat(inside, 3)
     edges = edges.reshape(-1, edges.shape[2])
     ends = np.sort(edges[:, [0, -1]], axis=1)

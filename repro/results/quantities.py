@@ -24,6 +24,8 @@ class Unit:
         Its spelling for readers.
     factor : float
         How many of this unit are one of the package's own unit of the same kind.
+    smaller : tuple of (str, float)
+        Symbol and factor of the units in which pages show small values, the largest unit first.
 
     Examples
     --------
@@ -35,6 +37,7 @@ class Unit:
     udunits: str
     symbol: str
     factor: float = 1
+    smaller: tuple[tuple[str, float], ...] = ()
 
 
 #: By the endings of names.
@@ -43,13 +46,11 @@ UNITS = {"_m_per_d": Unit("m d-1", "m/day", 24e-6), "_mg_per_L": Unit("mg L-1", 
          "_ug_per_m_per_h": Unit("ug m-1 h-1", "ug/m/h", 1e-6),
          "_um3": Unit("um3", "um³"), "_um2": Unit("um2", "um²"), "_um": Unit("um", "um"),
          "_cm": Unit("cm", "cm", 1e-4), "_h": Unit("h", "h"),
-         "_s": Unit("s", "s"), "_MPa": Unit("MPa", "MPa"),
+         "_s": Unit("s", "s"),
+         "_MPa": Unit("MPa", "MPa", smaller=(("kPa", 1e3), ("Pa", 1e6))),
          "_uN_per_m": Unit("uN m-1", "uN/m", 1e6), "_nN": Unit("nN", "nN", 1e3),
          "_uL_per_min": Unit("uL min-1", "uL/min", 1e-9 / 60),
          "_pg_per_h": Unit("pg h-1", "pg/h", 1e-6)}
-#: Units in which pages show small values, by the endings of names: symbol and factor, the largest
-#: unit first.
-SMALLER = {"_MPa": (("kPa", 1e3), ("Pa", 1e6))}
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,10 @@ class Quantity:
         True if its values 1 and 0 mean yes and no.
     signed : bool
         True if it may be negative.
+    jumps : str
+        Parts of the scene whose tables over time make it jump: "flow", "flow and substrates"
+        without stored substrates, or "flow and forces" with the fluid's forces. Empty if it does
+        not jump.
 
     Examples
     --------
@@ -92,6 +97,7 @@ class Quantity:
     needs: str = ""
     yes_no: bool = False
     signed: bool = False
+    jumps: str = ""
 
     @property
     def unit(self) -> Unit:

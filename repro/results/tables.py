@@ -31,7 +31,6 @@ from repro.timing import progress_bar
 if TYPE_CHECKING:
     from repro.results.permeability import Permeability
 
-CONVENTIONS = "CF-1.11"
 TIME = "time_h"
 #: The name of the picture of all outlines.
 OUTLINES = "outlines"
@@ -655,7 +654,7 @@ class Results(Mapping[str, np.ndarray]):
         ...     xarray.load_dataset(f"{folder}/run.nc").mean_velocity_m_per_d.item()
         2.9
         """
-        about = {"Conventions": CONVENTIONS, "title": f"Clogging of one pore: {self.name}",
+        about = {"Conventions": "CF-1.11", "title": f"Clogging of one pore: {self.name}",
                  "status": printable(self.status), "scene_tables": json.dumps(self.tables)}
         if self.provenance:
             versions = self.provenance["versions"]

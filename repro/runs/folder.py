@@ -29,8 +29,6 @@ CHECKPOINTS = (*STATES, REFUSED)
 #: Every file that a run may write, except its fields.
 RUN_FILES = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,
              REPORT, *CHECKPOINTS, LAST)
-#: Further files that the runs of earlier versions have written.
-FORMER_FILES = ("timeseries.nc",)
 #: A line of SUMS, in the format of sha256sum.
 SUM = re.compile(rf"([0-9a-f]{{64}})  ({FIELDS.pattern})")
 #: A temporary folder of a file that is being written, and the names of files in it.
@@ -49,8 +47,8 @@ def list_written_files(folder: Path, record: dict) -> set[str]:
         raise OutputError(f"{folder}: run.json lists no files of a run; move the folder away, or "
                           "name another")
     listed = map(str, record["files"])
-    names = {name for name in listed
-             if name in (*RUN_FILES, *FORMER_FILES) or FIELDS.fullmatch(name)}
+    own = (*RUN_FILES, "timeseries.nc")  # which runs of earlier versions have written
+    names = {name for name in listed if name in own or FIELDS.fullmatch(name)}
     if SUMS in names and is_file(folder / SUMS):
         names |= read_sums(folder).keys()
     return names | {PROVENANCE, *CHECKPOINTS}

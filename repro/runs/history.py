@@ -58,11 +58,6 @@ COUNTS = (
 )
 
 
-def fields_name(kind: str, number: int) -> str:
-    """Name of the fields file of a kind ("fields", "before_expansion") and number."""
-    return f"fields/{kind}_{number:04d}.vtu"
-
-
 def restore_history(plain: dict) -> History:
     """Restore a History from ``vars(history)`` after a round trip through JSON."""
     pairs = {name: list(map(tuple, plain.get(name, ()))) for name in ("index", "before", "missing")}

@@ -15,12 +15,12 @@ from time import monotonic
 
 from repro.errors import OutputError, printable
 from repro.polling import polling
+from repro.runs.status import is_over
 
 Tell = Callable[[dict], None]
-#: Seconds between updates of the bar, and between lines: at first, and at most.
+#: Seconds between updates of the bar, and without a line.
 TICK = 0.5
-SILENCE = 1.0
-LONGEST = 1.5
+SILENCE = 1.5
 #: The bar, and its replacement on a terminal with fewer columns.
 WIDE = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
         "[{elapsed} < {remaining}{postfix}]")
@@ -73,11 +73,7 @@ def _warning(event: dict) -> str:
 
 @contextmanager
 def in_lines() -> Iterator[Tell]:
-    """Print a line after each tenth of the simulated time, after a silence, and at the end.
-
-    The silence is a fiftieth of the wall time, between SILENCE and LONGEST (s), which keeps a log
-    short.
-    """
+    """Print a line after each tenth of the simulated time, after a silence, and at the end."""
     begun = printed_at = monotonic()
     reached = 0
     last_step: dict = {}
@@ -99,8 +95,7 @@ def in_lines() -> Iterator[Tell]:
                 line()
 
     def tick() -> None:
-        silence = min(LONGEST, max(SILENCE, (monotonic() - begun) / 50))
-        if last_step and monotonic() - printed_at > silence:
+        if last_step and monotonic() - printed_at > SILENCE:
             contact = ", contact" if last_step["contact"] else ""
             line(f", step {last_step['step']}{contact}, {monotonic() - begun:.0f} s")
 
@@ -157,7 +152,7 @@ def _report_start_and_end(event: dict, say_aside: Callable[[str], None]) -> None
     if event["event"] == "start" and event["from_h"] > 0:
         say_aside(printable(f"{event['scene']}: resumes from t = {event['from_h']:g} h, "
                             f"step {event['step']}"))
-    if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
+    if event["event"] == "end" and is_over(event["status"]):
         suffix = "" if event["changed"] else ", already finished"
         say(printable(f"{event['scene']}: {event['status']}{suffix}; "
                       f"results in {event['folder']}"))

@@ -11,7 +11,7 @@ from repro import report, results, timing
 from repro.errors import Interrupted, shell_word
 from repro.march.balance import Ledger
 from repro.march.state import Report, RestartState, sum_counts
-from repro.march.step_control import StepControl, exceeds_tolerance
+from repro.march.step_control import exceeds_tolerance
 from repro.preflight.numbers import reached
 from repro.preflight.simplifications import (
     Caveat,
@@ -37,7 +37,6 @@ from repro.runs.folder import (
 from repro.runs.history import (
     COUNTS,
     History,
-    fields_name,
     require_fields,
     restore_history,
 )
@@ -112,15 +111,12 @@ class Recorder:
             history.departed += reported.departed
         if state.missing and state.missing not in history.missing:  # not before a resume
             history.missing.append(state.missing)
-        if self.state and state.step_control != self.state.step_control:
-            self._count_missed_tolerance(state.step_control)
+        control = state.step_control
+        is_new = self.state is not None and control != self.state.step_control
+        if is_new and exceeds_tolerance(control, self.scene.numerics.tolerance):
+            history.missed += 1
+            history.worst = max(history.worst, control.estimate)
         self.state = state
-
-    def _count_missed_tolerance(self, step_control: StepControl) -> None:
-        """Count the last step if it misses the tolerance."""
-        if exceeds_tolerance(step_control, self.scene.numerics.tolerance):
-            self.history.missed += 1
-            self.history.worst = max(self.history.worst, step_control.estimate)
 
     def _ledger_rows(self, ledgers: Iterable[Ledger]) -> list[list[float]]:
         return [results.ledger_row(self.scene, ledger) for ledger in ledgers]
@@ -149,7 +145,7 @@ class Recorder:
                 *of_growth]
 
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
-        name = fields_name(kind, len(index))
+        name = f"fields/{kind}_{len(index):04d}.vtu"
         path = claim(self.folder, name, self.run_files)
         with file_errors(path), atomic_path(path) as beside:
             field_files.write(beside, results.fields(self.scene, pore, solved))

@@ -21,7 +21,7 @@ from repro.runs.execution import Watch, issue_warnings, origin_of
 from repro.runs.folder import read_sums
 from repro.runs.machine import conditions
 from repro.runs.state_arrays import unpack_state
-from repro.scene import Scene, Source, load_scene
+from repro.scene import Source, load_scene
 from repro.scene.arguments import Overrides, typed
 from repro.timing import progress_bar
 
@@ -195,16 +195,13 @@ def _rerun(run: reading.Run, time: float) -> dict[str, np.ndarray]:
     if (record["versions"], record["conditions"]["source"]) != current:
         warnings.warn(f"{run.folder}: code or packages have changed since the run: the fields at "
                       f"{time:g} h may differ from those of its rows", stacklevel=4)
-    states = [state for name in (checkpoint.LAST, *checkpoint.STATES)
-              for state in _saved_states(scene, run.folder / name) if state.time <= time]
-    return fields_at(scene, max(states, key=lambda state: state.time, default=None), time)
-
-
-def _saved_states(scene: Scene, path: Path) -> Iterator[RestartState]:
-    """The state in a file, unless it is absent, damaged or of another version or scene."""
-    with suppress(CheckpointError):
-        plain, saved = checkpoint.read_checkpoint(path)
-        yield unpack_state(scene, plain["state"], saved)
+    states: list[RestartState] = []
+    for name in (checkpoint.LAST, *checkpoint.STATES):
+        with suppress(CheckpointError):  # it is absent, damaged, or of another version or scene
+            plain, saved = checkpoint.read_checkpoint(run.folder / name)
+            states.append(unpack_state(scene, plain["state"], saved))
+    earlier = [state for state in states if state.time <= time]
+    return fields_at(scene, max(earlier, key=lambda state: state.time, default=None), time)
 
 
 class _Files(Sequence[dict[str, np.ndarray]]):

@@ -24,26 +24,22 @@ from repro.model.solid import material
 from repro.runs.checkpoint import Arrays
 from repro.scene import Scene, scene_hash
 
-#: Arrays of the mesh and of an aggregate, by the names of their fields. Those of the second
-#: aggregate end in _2, and so on.
-OF_MESH = ("points", "cells")
+#: Arrays of an aggregate, by the names of their fields. Those of the second aggregate end in _2,
+#: and so on.
 OF_BODY = ("wall", "fixed", "active", "inert", "theta")
-#: Arrays of the concentrations from which Newton's method starts.
-OF_GUESS = ("acceptor", "donor")
 
 
 def pack_state(scene: Scene, state: RestartState) -> tuple[dict, Arrays]:
     """Convert a state to values for JSON, and arrays."""
     pore = state.pore
     guess = pore.concentrations
-    arrays = {name: getattr(pore.mesh, name) for name in OF_MESH}
-    arrays["region"] = pore.mesh.topology.region
-    arrays["pressure"] = pore.pressure
+    arrays = {"points": pore.mesh.points, "cells": pore.mesh.cells,
+              "region": pore.mesh.topology.region, "pressure": pore.pressure}
     for number, (body, loop) in enumerate(zip(pore.bodies, pore.mesh.topology.loops)):
         of_body = {"loop": loop, **_body_arrays(body)}
         arrays |= {f"{name}{_ending(number)}": array for name, array in of_body.items()}
     if guess:
-        fields = {name: getattr(guess, name) for name in OF_GUESS}
+        fields = {"acceptor": guess.acceptor, "donor": guess.donor}
         arrays |= {name: field for name, field in fields.items() if field is not None}
     plain = {"scene": scene_hash(scene), "time_h": pore.time, "pace": asdict(state.step_control),
              "ends_um": [float(x) for x in pore.mesh.ends], "front": float(pore.front),
@@ -98,8 +94,7 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     guess = None
     if plain["guess"] is not None:
         from repro.model.transport import Concentrations  # a scene without [substrates] has none
-        acceptor, donor = map(arrays.get, OF_GUESS)
-        guess = Concentrations(acceptor, donor, plain["guess"])
+        guess = Concentrations(arrays.get("acceptor"), arrays.get("donor"), plain["guess"])
     bodies = tuple(_body(scene, space, region, plain, number, each)
                    for number, (region, each) in enumerate(zip(mesh.regions, own)))
     return Pore(plain["time_h"], space, bodies, arrays["pressure"], guess, plain["front"])

@@ -7,6 +7,7 @@ from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from repro.errors import shortened
 from repro.scene.reading import assignments
 from repro.scene.units import plain
 
@@ -15,8 +16,6 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 Overrides = Sequence[str] | dict[str, Any]
 #: Kinds of numbers that an annotation stands for, NumPy's among them.
 NUMBERS: dict[object, type] = {float: Real, int: Integral}
-#: Characters of a refused value in a message.
-LONGEST_VALUE = 60
 
 
 def typed(function: Function) -> Function:
@@ -85,5 +84,4 @@ def _short(value: object) -> str:
     text = repr(value)
     if " at 0x" in text:
         text = f"a {type(value).__name__}"
-    text = " ".join(text.split())
-    return text if len(text) <= LONGEST_VALUE else text[:LONGEST_VALUE - 3] + "..."
+    return shortened(" ".join(text.split()))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from repro.scene.needed import package
-from repro.scene.rules import FINEST
+from repro.scene.rules import FINEST, SIDES
 from repro.scene.units import MOST_POINTS, Drawn, Refused
 
 if TYPE_CHECKING:
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
 #: Largest file of a polygon (bytes), and mask (pixels): a microscope's camera has fewer.
 LARGEST, MOST_PIXELS = 10_000_000, 100_000_000
-#: The module of an optional package that reads masks.
-PILLOW = "PIL.Image"
-WALLS = {"lower": "y = 0 um", "upper": "y = pore.width"}
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ def _mask(drawn: Drawn, width: float) -> Shape:
     from shapely import box, unary_union
 
     try:
-        images = package(PILLOW, "pillow")
+        images = package("PIL.Image", "pillow")
     except ImportError as error:
         raise Refused(str(error)) from None
     with images.open(drawn.file, formats=["PNG"]) as image:
@@ -164,8 +161,8 @@ def _on_wall(shape: Shape, wall: str, width: float) -> tuple[tuple[float, float]
         other = "upper" if wall == "lower" else "lower"
         elsewhere = any(y == opposite for _, y in ring) and not any(on_wall)
         hint = f', and the other one, for which wall = "{other}" is needed' if elsewhere else ""
-        raise Refused(f"one side of the polygon on its wall ({WALLS[wall]}) is needed; it touches "
-                      f"the wall in {len(leaves)} places{hint}")
+        raise Refused(f"one side of the polygon on its wall ({SIDES[wall][0]}) is needed; it "
+                      f"touches the wall in {len(leaves)} places{hint}")
     ring = ring[leaves[0]:] + ring[:leaves[0]]
     end = next(k for k, (_, y) in enumerate(ring) if k and y == own_level)
     line = ring[:end + 1]

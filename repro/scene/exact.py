@@ -29,15 +29,15 @@ class Unit(NamedTuple):
         return Unit(self.size * other.size, *(a + b for a, b in zip(self[1:], other[1:])))
 
 
-SECOND = Unit(Fraction(1), time=1)
 #: Units that take prefixes.
-PREFIXED = {"m": Unit(Fraction(1), length=1), "g": Unit(Fraction(1, 1000), mass=1), "s": SECOND,
+PREFIXED = {"m": Unit(Fraction(1), length=1), "g": Unit(Fraction(1, 1000), mass=1),
+            "s": Unit(Fraction(1), time=1),
             "L": Unit(Fraction(1, 1000), length=3), "l": Unit(Fraction(1, 1000), length=3),
             "Pa": Unit(Fraction(1), -1, 1, -2)}
 #: Other units, each with its names.
-NAMED = {"min minute minutes": SECOND._replace(size=Fraction(60)),
-         "h hr hour hours": SECOND._replace(size=Fraction(3600)),
-         "d day days": SECOND._replace(size=Fraction(86_400)),
+NAMED = {"min minute minutes": Unit(Fraction(60), time=1),
+         "h hr hour hours": Unit(Fraction(3600), time=1),
+         "d day days": Unit(Fraction(86_400), time=1),
          "rad radian radians": Unit(Fraction(1)), "deg degree degrees": Unit(PI / 180)}
 #: Every known spelling.
 UNITS = {prefix + name: unit._replace(size=unit.size * Fraction(10) ** power)

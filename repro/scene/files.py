@@ -7,11 +7,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from repro.errors import shortened
 from repro.scene import bodies
 from repro.scene.reading import Place, did_you_mean, elsewhere, quote
 from repro.scene.units import SceneError, nearest, odd_character
 
-LONGEST_LINE = 80  # characters of a line of a file in a message
 #: Largest size of a file (bytes). The longest accepted outline and tables take 245 000 bytes;
 #: tomllib needs up to 400 times as much memory.
 LARGEST = 300_000
@@ -118,7 +118,7 @@ def _line_of(text: str, message: str) -> str:
     path = "; a path has / or stands in single quotes, such as file = 'C:\\images\\colony.png'"
     hint = quotes if BARE.search(line) else path if "\\" in line else ""
     hint = hint if letter.isascii() else f"; {odd_character(letter)}"
-    return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
+    return f": {shortened(line, 80)}{hint}"
 
 
 def key_of(entry: str) -> str:

@@ -25,36 +25,34 @@ from repro.scene.files import key_of, leave_out, override, read_tables
 from repro.scene.former import with_former
 from repro.scene.needed import MissingError, needed
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
-from repro.scene.rules import LIMITING, rules
+from repro.scene.rules import rules
 from repro.scene.time_table import TimeTable, TimeTables, at_largest, at_time, time_tables
 from repro.scene.units import (
     ACUTE,
     BELOW_1,
     EITHER_SIGN,
-    FRACTION,
-    FROM_0_TO_100,
     NON_NEGATIVE,
     NOT_IN_PAPER,
     PORE_WIDTH,
-    UP_TO_1,
-    UP_TO_20,
     WORD,
     Drawn,
     Flag,
     Points,
     Refused,
     SceneError,
+    Share,
     Stated,
     Times,
     choice,
+    from_0_to,
     number,
     quantity,
     scene_key,
     section,
     sections,
-    share,
     timed_quantity,
     units_of,
+    up_to,
 )
 from repro.schemes import CURVED, PAPER, PRINTED, Scheme
 
@@ -207,8 +205,8 @@ class Acceptor(Substrate):
 
     diffusivity: float = quantity(
         "2.32 cm^2/day", "um^2/h", about="D_A in water", source="(7), Table 1")
-    diffusivity_in_aggregate: float = share(
-        "1.85 cm^2/day", "um^2/h", "diffusivity", about="D_A in the aggregate",
+    diffusivity_in_aggregate: float = scene_key(
+        Share("um^2/h", "1.85 cm^2/day", of="diffusivity"), about="D_A in the aggregate",
         source="2.2 (80 % of that in water), Table 1")
 
 
@@ -218,8 +216,8 @@ class Donor(Substrate):
 
     diffusivity: float = quantity(
         "1.01 cm^2/day", "um^2/h", about="D_D in water", source="(8), Table 1")
-    diffusivity_in_aggregate: float = share(
-        "0.81 cm^2/day", "um^2/h", "diffusivity", about="D_D in the aggregate",
+    diffusivity_in_aggregate: float = scene_key(
+        Share("um^2/h", "0.81 cm^2/day", of="diffusivity"), about="D_D in the aggregate",
         source="2.2 (80 % of that in water), Table 1")
     inhibition_constant: float = quantity(
         "100 mg/L", "mg/L", about="K_i of Haldane's law, with kinetics.law = \"Haldane\"")
@@ -257,6 +255,12 @@ class Substrates:
         return {name: substrate for name, substrate in pair.items() if substrate is not None}
 
     @property
+    def slowest(self) -> float:
+        """The smallest diffusivity (um^2/h)."""
+        return min(min(kind.diffusivity, kind.diffusivity_in_aggregate)
+                   for kind in self.modelled.values())
+
+    @property
     def places(self) -> slice:
         """The places of the substrates in (acceptor, donor)."""
         return slice(int(self.acceptor is None), 1 + int(self.donor is not None))
@@ -281,12 +285,12 @@ class Kinetics:
         "9.3 1/day", "1/h", NON_NEGATIVE, source="(7)-(9), Table 1",
         about="k, mg of donor per mg of active biomass and time")
     yield_coefficient: float = number(
-        0.61, UP_TO_1, about="Y, mg of biomass per mg of donor", source="(9), Table 1")
+        0.61, up_to(1), about="Y, mg of biomass per mg of donor", source="(9), Table 1")
     decay_coefficient: float = quantity(
         "0.12 1/day", "1/h", NON_NEGATIVE, about="b, decay of active biomass",
         source="(9)-(10), Table 1")
     degradable_fraction: float = number(
-        0.8, FRACTION, about="f_d; the part 1 - f_d of decayed biomass stays, inert",
+        0.8, from_0_to(1), about="f_d; the part 1 - f_d of decayed biomass stays, inert",
         source="(7), (10), Table 1")
     decay_oxygen_demand: float = number(
         1.42, about="d_c, mg of acceptor per mg of biomass that degrades",
@@ -381,7 +385,7 @@ class Growth:
         "neo-Hookean", "Gent", source="(17); section 5 calls others straightforward",
         about="Elastic energy of the aggregate; Gent's stiffens towards limiting_invariant")
     limiting_invariant: float = number(
-        LIMITING, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
+        100.0, source=NOT_IN_PAPER + "; about that of rubber (Gent 1996)",
         about="J_m of Gent's energy, with energy = \"Gent\": J^(-2/3) tr C stays below 3 + J_m")
     meeting: str = choice(
         "weld", "end", source="Section 5, without a model",
@@ -431,7 +435,7 @@ class Numerics:
               "0.1 %, exact by less than 0.01 %. paper is the paper's scheme, and conserves mass; "
               "as_printed does not [E4, E8]. sketch errs by about 1 % until contact. Errors grow "
               "after contact, those of sketch to 18 % in narrow pores")
-    tolerance: float = number(0.01, UP_TO_1,
+    tolerance: float = number(0.01, up_to(1),
                               about="Largest error of a midpoint step: change of the growth rate "
                                     "times the step")
     transport: str = choice(
@@ -447,13 +451,13 @@ class Numerics:
     solver: str = choice("superlu", "pardiso",
                          about="Solver of linear systems; the second needs the package pypardiso")
     refinement: float = number(
-        1.0, UP_TO_20, source="3.1 [E13]", about="Divides the element sizes")
+        1.0, up_to(20), source="3.1 [E13]", about="Divides the element sizes")
     gradation: float = number(
-        0.25, FRACTION, source="3.1 [E13]",
+        0.25, from_0_to(1), source="3.1 [E13]",
         about="Growth of element sizes with distance from an aggregate, doubled in contact; "
               "0: one size everywhere")
     contact_elements: float = number(
-        0.0, FROM_0_TO_100,
+        0.0, from_0_to(100),
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "
               "2 at least with a permeable aggregate; 0: as large as elsewhere on the interface")
     exchanged: Scheme | None = None  # no key: ``repro.simulate(..., scheme=...)``

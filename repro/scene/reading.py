@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
+from repro.errors import shortened
 from repro.scene import bodies, former
 from repro.scene.units import (
     Quantity,
@@ -19,7 +20,6 @@ from repro.scene.units import (
     plain,
 )
 
-LONGEST_KEY = 60  # characters of a key in a message
 SCOPE = "`repro docs scope`"
 #: {section: (what a scene has of it, words in the keys of models with more)}. Another table in the
 #: section is refused with the same sentence, and so is a list of tables. A noun with a number, such
@@ -55,7 +55,7 @@ class Place:
         return NOT_MODELLED[section][0] if section and section in NOT_MODELLED else ""
 
     def below(self, key: str) -> "Place":
-        key = key if len(key) <= LONGEST_KEY else key[: LONGEST_KEY - 3] + "..."
+        key = shortened(key)
         return replace(self, key=f"{self.key}.{key}" if self.key else key)
 
     def refuse(self, value: object, requirement: str) -> SceneError:
@@ -246,7 +246,7 @@ def quote(value: object, longest: int = 60) -> str:
         text = json.dumps(value, ensure_ascii=False, default=_plain)
     except (ValueError, RecursionError):  # thousands of digits, tables nested by the thousand
         text = type(value).__name__
-    return text if len(text) <= longest else text[: longest - 3] + "..."
+    return shortened(text, longest)
 
 
 def _plain(value: object) -> object:

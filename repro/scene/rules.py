@@ -27,8 +27,6 @@ MOST_ROWS = 10_000  # of output.every
 SHORTEST_STEP = 1e-6  # h: times closer than 1e-9 h are equal
 FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
-INHIBITION = 100.0  # mg/L: the default of K_i
-LIMITING = 100.0  # the default of J_m
 TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
 
 #: A number or a table over time.
@@ -91,13 +89,19 @@ def _aggregate_rules(scene: "Scene", place: str, aggregate: "Aggregate") -> Rule
 
 def _pair_rules(scene: "Scene") -> Rules:
     """Rules of the distances between aggregates at t = 0."""
+    if len(scene.aggregates) < 2:
+        return
+    from shapely import Point, Polygon
+
     growth = scene.growth
     least = growth.minimum_film if growth else FINEST * scene.pore.width
     named = "growth.minimum_film" if growth else "a thousandth of pore.width"
-    bodies = [(place, *_extent(aggregate, scene.pore.width))
-              for place, aggregate in zip(scene.aggregate_keys, scene.aggregates)]
+    bodies = []
+    for place, aggregate in zip(scene.aggregate_keys, scene.aggregates):
+        points, reach = _extent(aggregate, scene.pore.width)
+        bodies.append((place, Polygon(points) if len(points) > 1 else Point(points), reach))
     for (one, near, reach), (other, far, extent) in combinations(bodies, 2):
-        gap = _distance(near, far) - reach - extent
+        gap = near.distance(far) - reach - extent
         distance = f"are {gap:.3g} um apart" if gap > 0 else "overlap or touch"
         requirement = f"{one} and {other} {distance}; {named} ({least:g} um) or more is needed"
         yield gap < least, {f"{place}.{key}": requirement for place in (other, one)
@@ -112,16 +116,6 @@ def _extent(aggregate: "Aggregate", width: float) -> tuple[Outlined, float]:
         level = 0.0 if aggregate.wall == "lower" else width
         return ((x, level),), aggregate.radius
     return tuple((x + each, y) for each, y in aggregate.outline), 0.0
-
-
-def _distance(one: Outlined, other: Outlined) -> float:
-    """Least distance (um) between points or polygons."""
-    if len(one) == len(other) == 1:
-        return math.dist(one[0], other[0])
-    from shapely import Point, Polygon
-
-    shapes = [Polygon(points) if len(points) > 1 else Point(points[0]) for points in (one, other)]
-    return shapes[0].distance(shapes[1])
 
 
 def _seed_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
@@ -146,13 +140,13 @@ def _seed_rules(place: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
 
 
 #: An outline's wall in messages: y on it, the opposite wall, y on that, and accepted values of y.
-_SIDES = {"lower": ("y = 0 um", "upper wall", "y = pore.width", "0 < y <= pore.width ({})"),
-          "upper": ("y = pore.width", "lower wall", "y = 0", "0 <= y < pore.width ({})")}
+SIDES = {"lower": ("y = 0 um", "upper wall", "y = pore.width", "0 < y <= pore.width ({})"),
+         "upper": ("y = pore.width", "lower wall", "y = 0", "0 <= y < pore.width ({})")}
 
 
 def _shape_rules(key: str, aggregate: "Aggregate", pore: "Pore") -> Rules:
     """Rules of an outline. ``points`` have their y from its own wall."""
-    own, wall, opposite, accepted = _SIDES[aggregate.wall]
+    own, wall, opposite, accepted = SIDES[aggregate.wall]
     width, half = pore.width, pore.length / 2
     drawn, _ = _extent(aggregate, width)
     points = tuple((x, y if aggregate.wall == "lower" else width - y) for x, y in drawn)
@@ -279,7 +273,7 @@ def _kinetics_rules(law: "Kinetics", donor: "Donor | None") -> Rules:
     yield haldane and donor is None, {
         "kinetics.law": '[substrates.donor] is needed with "Haldane": the donor inhibits',
         "substrates.acceptor": '[substrates.donor] is needed with kinetics.law = "Haldane"'}
-    changed = donor is not None and donor.inhibition_constant != INHIBITION
+    changed = donor is not None and donor.inhibition_constant != type(donor)().inhibition_constant
     yield changed and not haldane, _only_with(
         "substrates.donor.inhibition_constant", "kinetics.law", "Haldane")
 
@@ -307,7 +301,8 @@ def _growth_rules(scene: "Scene", growth: "Growth") -> Rules:
         "growth.after_detachment": "growth.bonding_strength or [growth.erosion] is needed with "
                                    "\"continue\"",
         "growth.bonding_strength": 'needed with growth.after_detachment = "continue"'}
-    yield growth.energy != "Gent" and growth.limiting_invariant != LIMITING, _only_with(
+    changed = growth.limiting_invariant != type(growth).limiting_invariant
+    yield changed and growth.energy != "Gent", _only_with(
         "growth.limiting_invariant", "growth.energy", "Gent")
     if growth.erosion:
         yield from _erosion_rules(scene, growth, growth.erosion)

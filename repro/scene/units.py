@@ -47,14 +47,14 @@ ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "pp
 MASSES = ("mg/L", "1/h")  # units of values that other models give in moles
 LONGEST = 80  # characters of a value with its unit
 MOST_POINTS = 1000  # of an outline
-_DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)?-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
 #: Signs of printed units, as a keyboard writes them.
 _PRINTED = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
                          "\u207b\u2212\u00b7\u22c5", "0123456789--**")
-_PERCENT = re.compile(rf"({_DIGITS}) *%")
-_QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
+_PERCENT = re.compile(rf"({DIGITS}) *%")
+_QUANTITY = re.compile(rf"({DIGITS}) *({_UNIT})")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
 _MOLES = re.compile(r"(?<![A-Za-z])(?:[num\u00b5\u03bc]|milli|micro|nano)?"
                     r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
@@ -73,15 +73,21 @@ class Range(NamedTuple):
 
 POSITIVE = Range("greater than zero", lambda value: value > 0)
 NON_NEGATIVE = Range("zero or more", lambda value: value >= 0)
-FRACTION = Range("from 0 to 1", lambda value: 0 <= value <= 1)
 BELOW_1 = Range("zero or more, less than 1", lambda value: 0 <= value < 1)
-UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
-FROM_0_TO_100 = Range("from 0 to 100", lambda value: 0 <= value <= 100)
-UP_TO_20 = Range("greater than zero, at most 20", lambda value: 0 < value <= 20)
 #: Of a pore: below it water is no continuum; above it no pore is meant.
 PORE_WIDTH = Range("from 1 nm to 1 m", lambda value: 1e-3 <= value <= 1e6)
 ACUTE = Range("between 0 and 90 deg", lambda value: 0 < value < math.pi / 2)
 EITHER_SIGN = Range("of either sign", math.isfinite)
+
+
+def from_0_to(most: float) -> Range:
+    """Return the range from 0 to ``most``."""
+    return Range(f"from 0 to {most:g}", lambda value: 0 <= value <= most)
+
+
+def up_to(most: float) -> Range:
+    """Return the range of numbers greater than zero up to ``most``."""
+    return Range(f"greater than zero, at most {most:g}", lambda value: 0 < value <= most)
 
 
 class Stated(NamedTuple):
@@ -127,7 +133,7 @@ class Quantity:
         endless = isinstance(value, int) and abs(value) >= 10**LONGEST
         if isinstance(value, bool) or endless:
             return ""
-        plain = isinstance(value, Real | str) and re.fullmatch(_DIGITS, f"{value}")
+        plain = isinstance(value, Real | str) and re.fullmatch(DIGITS, f"{value}")
         meant = f"{value} {self.usual_unit}" if plain else ""
         return f'"{meant}"' if _takes(self, meant) else ""
 
@@ -267,7 +273,7 @@ class Number(Plain):
     def near(self, value: object) -> str:
         """Suggest the number of a text that has no unit or one with a dimension."""
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
-        match = re.fullmatch(rf"({_DIGITS})(?: *({_UNIT}))?", text)
+        match = re.fullmatch(rf"({DIGITS})(?: *({_UNIT}))?", text)
         if match is None or not _takes(self, float(match[1])):
             return ""
         return "" if match[2] and _has_dimensionless_factor(match[2]) else match[1]
@@ -450,11 +456,6 @@ def timed_quantity(text: str, unit: str, accepts: Range = POSITIVE, **described)
     return scene_key(Timed(unit, text, accepts), **described)
 
 
-def share(text: str, unit: str, of: str, **described):
-    """Declare a value with a unit, like :func:`quantity`, or a share of the key `of`."""
-    return scene_key(Share(unit, text, of=of), **described)
-
-
 def number(example: float, accepts: Range = POSITIVE, **described):
     """Declare a plain number; `example` is its default unless `default` is set."""
     return scene_key(Number(example, accepts), **described)
@@ -552,7 +553,7 @@ def _fault(value: object) -> str:
     odd = _ODD.search(value.translate(_PRINTED))
     if odd:
         return odd_character(odd[0])
-    start = re.match(_DIGITS, value)
+    start = re.match(DIGITS, value)
     if start is None:
         return "it does not start with a number"
     unit = value[start.end():].strip()

@@ -11,6 +11,6 @@ A preset is one of these schemes plus a few numbers. Other combinations are for 
 
 from repro.schemes.curved import CURVED
 from repro.schemes.paper import PAPER, PRINTED
-from repro.schemes.scheme import Scheme
+from repro.schemes.scheme import UNRESOLVED, Scheme
 
-__all__ = ["CURVED", "PAPER", "PRINTED", "Scheme"]
+__all__ = ["CURVED", "PAPER", "PRINTED", "UNRESOLVED", "Scheme"]

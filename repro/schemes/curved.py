@@ -1,6 +1,6 @@
 """The scheme on curved triangles. Compare it line by line with :mod:`repro.schemes.paper`."""
 
-from repro.schemes.scheme import Scheme
+from repro.schemes.scheme import UNRESOLVED, Scheme
 
 CURVED = Scheme(
     # Curved triangles with quadratic functions. Velocity and pressure need no tau
@@ -13,9 +13,8 @@ CURVED = Scheme(
     # Edges at the tips of an outline have the length W / (5000 refinement^2), W / 200 in the preset
     # fast.
     edges_at_tips=5000.0,
-    # A step of Gear's method may end below zero by as much of the supply as profiles at rest
-    # (transport.UNRESOLVED).
-    undershoot=1e-3,
+    # A step of Gear's method may end as far below zero as profiles at rest.
+    undershoot=UNRESOLVED,
     # A concentration above its supply by more than 2 % is not resolved.
     overshoot=0.02,
     # The midpoint rule, with steps as long as numerics.tolerance allows (march.stepping).

@@ -14,6 +14,8 @@ WORDS: dict[str, tuple[str, ...]] = {
 }
 #: {elements: accepted transfers of biomass to a new mesh}.
 TRANSFERS = {"linear": ("projection", "interpolation"), "quadratic": ("shares",)}
+#: A concentration is not resolved if it is below zero by more than this part of its supply.
+UNRESOLVED = 1e-3
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,12 @@ from functools import partial
 from pathlib import Path
 
 from repro.errors import OutputError
+from repro.runs.status import FAILED
 from repro.scene.needed import package
 from repro.sweeps import pool, single_run
 from repro.sweeps.design import Point
 from repro.sweeps.pool import EndedRuns, RunPoints
 
-PACKAGE = "distributed"
 #: Seconds to wait for the answer of a scheduler.
 ANSWER = 2
 #: Seconds to wait for the workers of a scheduler.
@@ -37,7 +37,10 @@ def ready(address: str) -> Iterator[RunPoints]:
     Raises OutputError within seconds, before anything is written, if no scheduler answers or the
     package ``distributed`` is not installed.
     """
-    distributed = _package(address)
+    try:
+        distributed = package("distributed")
+    except ImportError as error:
+        raise OutputError(f"--scheduler {address}: {error}") from None
     try:
         with ThreadPoolExecutor(1) as thread:  # a notebook has its own event loop in this one
             thread.submit(lambda: asyncio.run(_ask(distributed, address))).result()
@@ -46,13 +49,6 @@ def ready(address: str) -> Iterator[RunPoints]:
                           "such as tcp://host:8786 is needed") from error
     with distributed.Client(address, timeout=PATIENCE, set_as_default=False) as client:
         yield partial(run_points, client=client, address=address)
-
-
-def _package(address: str):
-    try:
-        return package(PACKAGE)
-    except ImportError as error:
-        raise OutputError(f"--scheduler {address}: {error}") from None
 
 
 async def _ask(distributed, address: str) -> None:
@@ -102,6 +98,6 @@ def inspect_worker(path: str) -> tuple[str, bool]:
 def run_on_worker(expected: str, point: Point, folder: Path) -> str:
     """On a worker with the expected code: make a run in a process; return how the run ended."""
     if single_run.code() != expected:
-        return (f"failed: a worker that joined has version {single_run.code()} of this package, "
+        return (f"{FAILED}a worker that joined has version {single_run.code()} of this package, "
                 f"{expected} is needed")
     return _processes.make(point, folder, LEAVING)

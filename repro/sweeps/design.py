@@ -30,13 +30,13 @@ from repro.scene import (
 from repro.scene import label as label_of
 from repro.scene.files import key_of, override
 from repro.scene.reading import quote
+from repro.scene.units import DIGITS
 
 MOST_POINTS = 10_000
 #: A scene has one of these keys: varying it replaces the others.
 DRIVES = ("flow.head", "flow.mean_velocity", "flow.rate")
 EXPECTED_FORM = ('KEY=a:b UNIT:linear|log:N or KEY=VALUE, VALUE, ... is needed, such as '
                  '"flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"')
-_NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)", re.S)
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def bare(item: str) -> str:
 
 def number(text: str) -> tuple[str, str]:
     """The digits and the unit of a text, both empty if it is not a number."""
-    match = _NUMBER.fullmatch(text)
+    match = re.fullmatch(rf"({DIGITS})\s*(.*)", text, re.S)
     return (match[1], match[2]) if match else ("", "")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
+from math import prod
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -95,21 +95,16 @@ class Swept:
         ImportError
             If xarray is not installed.
         """
+        from_dataframe = package("xarray").Dataset.from_dataframe
+        units = {factor.key: factor.unit for factor in self.factors}
+        keys = list(units)
         frame = self.to_pandas().drop(columns="folder")
-        varied = [frame.pop(factor.column).to_numpy() for factor in self.factors]
-        levels = [list(dict.fromkeys(values.tolist())) for values in varied]
-        units = [{"units": factor.unit} for factor in self.factors]
-        keys = [factor.key for factor in self.factors]
-        if list(product(*levels)) == list(zip(*(values.tolist() for values in varied))):
-            dims, shape, values = keys, tuple(map(len, levels)), levels
-            coordinates = {key: ([key], *rest) for key, *rest in zip(keys, values, units)}
-        else:
-            dims, shape = ["run"], (len(frame),)
-            coordinates = {key: (["run"], *rest) for key, *rest in zip(keys, varied, units)}
-            coordinates["run"] = (["run"], frame.index.to_numpy(), {})
-        variables = {name: (dims, column.to_numpy().reshape(shape), {"units": unit_of(name).symbol})
-                     for name, column in frame.items()}
-        return package("xarray").Dataset(variables, coordinates, {"scene": self.source})
+        frame = frame.rename(columns=dict(zip((each.column for each in self.factors), keys)))
+        is_grid = len(frame) == prod(frame[keys].nunique()) and not frame.duplicated(keys).any()
+        dataset = from_dataframe(frame.set_index(keys) if is_grid else frame).set_coords(keys)
+        for name, variable in dataset.variables.items():
+            variable.attrs["units"] = units.get(name, unit_of(name).symbol)
+        return dataset.assign_attrs(scene=self.source)
 
     def permeability(self) -> Permeability:
         """Fit the laws of :meth:`repro.Results.permeability` to the rows of all runs."""

@@ -21,6 +21,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 from repro.runs.machine import THREADS
+from repro.runs.status import FAILED
 from repro.scene import scene_tables
 from repro.sweeps import single_run
 from repro.sweeps.design import Point
@@ -53,7 +54,7 @@ def submit(executor: Executor, make: Callable[[Point, Path], str], points: Seque
             try:
                 status = future.result()
             except Exception as error:  # any error of an executor is a failure of its run
-                status = f"failed: {type(error).__name__}: {' '.join(str(error).split())}"
+                status = f"{FAILED}{type(error).__name__}: {' '.join(str(error).split())}"
             yield futures[future], status
     finally:
         for future in futures:
@@ -85,7 +86,7 @@ class Processes:
         cause = f"ended with status {code}"
         with suppress(ValueError):
             cause = f"was killed by {signal.Signals(-code).name}"
-        return f"failed: the process of the run {cause}"
+        return f"{FAILED}the process of the run {cause}"
 
     def _take(self) -> subprocess.Popen:
         """Take an idle process, or start one."""

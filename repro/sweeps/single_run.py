@@ -21,7 +21,7 @@ from repro.runs.folder import PROVENANCE
 from repro.runs.integrity import find_damage
 from repro.runs.interrupts import catch_signals
 from repro.runs.machine import source_hash
-from repro.runs.status import INTERRUPTED, is_over
+from repro.runs.status import FAILED, INTERRUPTED, is_over
 from repro.scene import Scene, SceneError, parse_scene
 
 #: The line that asks a process to stop its run and to end.
@@ -47,11 +47,11 @@ def make(scene: Scene, folder: Path, patience: float = 0.0,
     except Interrupted:
         return INTERRUPTED
     except (SimulationError, OutputError, SceneError) as error:
-        return f"failed: {error}"
+        return f"{FAILED}{error}"
     except Exception as error:  # a bug is the failure of one run
         last = traceback.extract_tb(error.__traceback__)[-1]
         location = f"{Path(last.filename).name}, line {last.lineno}"
-        return f"failed: {type(error).__name__}: {' '.join(str(error).split())} ({location})"
+        return f"{FAILED}{type(error).__name__}: {' '.join(str(error).split())} ({location})"
 
 
 def _run_or_resume(scene: Scene, folder: Path, watch: Watch) -> str:

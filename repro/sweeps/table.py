@@ -148,8 +148,8 @@ class Runs(list[SweepRun]):
 
 def read_runs(sweep: Sweep, statuses: dict[int, str], clogged: float) -> Runs:
     """Read every run of a sweep; statuses: of runs that cannot be read, by their number."""
-    return Runs(_read_run(point, sweep.runs / point.name, statuses.get(point.index, "not run"),
-                          clogged)
+    return Runs(_read_run(point, sweep.runs / point.name, statuses.get(point.index,
+                                                                          status.NOT_RUN), clogged)
                 for point in sweep.points)
 
 

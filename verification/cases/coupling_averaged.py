@@ -255,7 +255,7 @@ def _losses(aspect: float) -> tuple[float, float, float]:
     """
     half, reach = LOW / aspect, LOW / aspect + LONG
     outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), channel_walls(WIDTH))
-    grid, _ = mesher.generate(outline, (-reach, reach), Sizing(channel_walls(WIDTH), 1.25, 2.0))
+    grid, _ = mesher.generate_around([outline], (-reach, reach), Sizing(channel_walls(WIDTH), 1.25, 2.0))
     drive = replace(thin_scene("linear", 0.5).flow, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
     solution = flow.solve(meshes.space_on(grid, 2), drive, LENGTH)
     s, weight = np.polynomial.legendre.leggauss(200)

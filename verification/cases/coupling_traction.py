@@ -330,7 +330,7 @@ def test_traction_remeshed(changes, record):
     seed, grown, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
     fine = loaded_scene(*changes, f"numerics.refinement={max(REMESHED_FROM, 3 * coarse.numerics.refinement)}")
-    mesh, _ = Meshing.of(fine).generate(grown.outline)
+    mesh, _ = Meshing.of(fine).around([grown.outline])
     forces = nodal_forces(fine, Space(mesh))[0]
     scale = flow.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
     new = _sums(mesh.points[mesh.loop], scale * forces[mesh.loop])

@@ -93,7 +93,7 @@ def test_poiseuille(interface, record):
 
 
 def _clean(refinement: float, interface: str) -> dict[str, float]:
-    grid, _ = mesher.generate(None, ENDS, Sizing(channel_walls(WIDTH), refinement, 2.0))
+    grid, _ = mesher.generate_around([], ENDS, Sizing(channel_walls(WIDTH), refinement, 2.0))
     return {"size": meshes.mean_size(grid), **_poiseuille_errors(Space(grid), 0.0, interface)}
 
 

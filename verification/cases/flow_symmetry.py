@@ -57,7 +57,7 @@ def test_poiseuille(order, interface, record):
 
 
 def _poiseuille(refinement: float, order: int, interface: str) -> dict[str, float]:
-    grid, _ = mesher.generate(None, ENDS, Sizing(WALLS, refinement, 2.0), order)
+    grid, _ = mesher.generate_around([], ENDS, Sizing(WALLS, refinement, 2.0), order)
     space = Space(grid)
     solution = flow.solve(space, flow_cases.drive(mean_velocity=MEAN), LENGTH, interface=interface_of(interface))
     exact = poiseuille.head_loss(np.ptp(ENDS), 2 * WIDTH, MEAN, VISCOSITY)

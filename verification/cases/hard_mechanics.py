@@ -198,7 +198,7 @@ def in_a_wedge(preset: str) -> list:
 
 def _loss(scene: Scene) -> float:
     """Loss over the meshed part, 1/um."""
-    grid, _ = Meshing.of(scene).generate(wedge(LEAST, scene.numerics.scheme.order, scene.pore.width))
+    grid, _ = Meshing.of(scene).around([wedge(LEAST, scene.numerics.scheme.order, scene.pore.width)])
     return flow.unit_flow(Space(grid), Viscous(scene.flow.viscosity_ratio)).loss
 
 

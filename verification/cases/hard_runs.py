@@ -104,7 +104,7 @@ def _mesh_and_loss(scene: Scene, noise: float) -> tuple[Mesh, float]:
     free = shape.wall == FREE
     points = shape.points.copy()
     points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
-    grid, _ = Meshing.of(scene).generate(replace(shape, points=points))
+    grid, _ = Meshing.of(scene).around([replace(shape, points=points)])
     return grid, flow.unit_flow(Space(grid), Viscous(2000.0)).loss
 
 

@@ -31,11 +31,6 @@ def steep(x, y):
 MASSES = "order 2 carries masses, not fields: reprojection-growing"
 
 
-def sampled(points, triangles, fields, new_points, new_triangles):
-    """The paper's transfer by interpolation, with the arguments of the projection."""
-    return transfer.interpolate(points, triangles, fields, new_points)
-
-
 def _located_errors(size: float, seed: int, order: int) -> dict[str, float]:
     """Error of a field of an order, interpolated at random points."""
     where = np.random.default_rng(8).uniform((0.0, 0.0), (pairs.ENDS[1], pairs.WIDTH), (1000, 2))
@@ -52,7 +47,7 @@ def _carried_errors(size: float, seed: int, carry) -> dict[str, float]:
 
 
 #: Transfers with bounds of the error on the finest mesh; those bounds for fields, by their order.
-CARRIERS = {"projection": (transfer.project, 2e-3), "interpolation": (sampled, 4e-3)}
+CARRIERS = {"projection": (transfer.project, 2e-3), "interpolation": (transfer.interpolated, 4e-3)}
 LOCATED = {1: 4e-3, 2: 1e-4}
 
 
@@ -82,7 +77,7 @@ def test_chain(record):
     Norm: change of the integral of a steep field over 40 remeshes, and of its square in each, relative; largest and
     least nodal value.
     """
-    projected, paper = (_remesh_history(carry, steep) for carry in (transfer.project, sampled))
+    projected, paper = (_remesh_history(carry, steep) for carry in (transfer.project, transfer.interpolated))
     rise = (projected["square"][1:] / projected["square"][:-1]).max()
     record(at_most("integral by projection", largest(projected["integral"] - 1), 1e-12, "round-off"))
     record(at_most("square by projection, after over before", rise, 1.0, "a projection raises no norm"))

@@ -11,7 +11,7 @@ from reference import neo_hookean
 from repro.fem.elements import ELEMENTS
 from repro.fem.forms import mass
 from repro.fem.mesh import triangle_areas
-from repro.fem.mesher import generate
+from repro.fem.mesher import generate_around
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
 from repro.fem.walls import channel_walls
@@ -37,7 +37,7 @@ def half_disc(refinement: float) -> Supported:
     refinement /= current().size
     outline = seed(RADIUS, ACROSS_AGGREGATE * refinement)
     sizing = Sizing(channel_walls(50.0), refinement, 2.0, GRADATION / refinement)
-    grid, _ = generate(outline, (-2 * RADIUS, 2 * RADIUS), sizing)
+    grid, _ = generate_around([outline], (-2 * RADIUS, 2 * RADIUS), sizing)
     return sliding(grid.points[grid.body], grid.topology.body_cells)
 
 

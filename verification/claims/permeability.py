@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from reference import layered_channel
-from repro.fem.mesher import generate
+from repro.fem.mesher import generate_around
 from repro.model import biomass
 from repro.model.meshing import sized
 from repro.scene import Scene
@@ -165,7 +165,7 @@ def filled() -> Finding:
     pore."""
     scene = load_packaged("flow_only")
     half = scene.pore.length / 2
-    empty, _ = generate(None, (-half, half), sized(scene))
+    empty, _ = generate_around([], (-half, half), sized(scene))
     full = replace(empty, topology=replace(empty.topology, region=1 - empty.topology.region))
     open_, closed = (flow_in(scene, grid).conductivity for grid in (empty, full))
     check = near("reduction of the conductivity (times)", "up to 2000", open_ / closed, scene.flow.viscosity_ratio,

@@ -393,7 +393,7 @@ def half_disc(scene, radius: float, reach: float) -> Mesh:
     end = min(radius + reach, scene.pore.length / 2)
     numerics = scene.numerics
     outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.scheme.order)
-    return mesher.generate(outline, (-end, end), meshing.sized(scene), numerics.scheme.order)[0]
+    return mesher.generate_around([outline], (-end, end), meshing.sized(scene), numerics.scheme.order)[0]
 
 
 def plug(scene, first: float, last: float) -> Mesh:
@@ -401,7 +401,7 @@ def plug(scene, first: float, last: float) -> Mesh:
     width = scene.pore.width
     points = np.array([(first, 0.0), (last, 0.0), (last, width), (first, width)])
     outline = Outline(points, np.repeat([BOTTOM, TOP], 2), np.zeros(4, bool), points)
-    return mesher.generate(outline, (first - 1.5 * width, last + 1.5 * width), meshing.sized(scene))[0]
+    return mesher.generate_around([outline], (first - 1.5 * width, last + 1.5 * width), meshing.sized(scene))[0]
 
 
 def halved(lattice: np.ndarray, falling=False) -> np.ndarray:

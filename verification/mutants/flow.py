@@ -257,8 +257,8 @@ MUTANTS = (
         ("gradients-of-degree-2",
          "Gradients are integrated by a rule of degree 2 at most.",
          "Space.gradient_degree",
-         "return elements.ELEMENTS[self.order].gradient_degree",
-         "return min(2, elements.ELEMENTS[self.order].gradient_degree)",
+         "return self.mesh.element.gradient_degree",
+         "return min(2, self.mesh.element.gradient_degree)",
          f"{GRADIENTS}[made]", f"{GRADIENTS}[bent]")),
     *changes(
         "repro/fem/sizing.py",

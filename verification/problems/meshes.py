@@ -100,7 +100,9 @@ def seed(radius: float, refinement: float, order: int = 1) -> outline.Outline:
 
 def around(seed: outline.Outline, refinement: float, ends, width: float) -> tuple[Mesh, outline.Outline]:
     """The package's mesh around an outline, and the outline with its split edges."""
-    return mesher.generate(seed, ends, sizing.Sizing(channel_walls(width), refinement, 2.0), seed.geometry)
+    sizes = sizing.Sizing(channel_walls(width), refinement, 2.0)
+    mesh, (split,) = mesher.generate_around([seed], ends, sizes, seed.geometry)
+    return mesh, split
 
 
 def half_disc_space(radius: float, refinement: float, ends, width: float, order: int) -> Space:
