@@ -344,6 +344,23 @@ def test_newton_for_lines_gives_up_if_it_is_not_near_the_solution_in_time(plugge
     assert iterations == [2, 2, 2]
 
 
+@pytest.mark.parametrize("defects, length", [([3.0], 1.0), ([9.0, 5.0, 3.0], 0.25), ([9.0] * 5, 0.0625)])
+def test_a_step_of_lines_that_raises_the_defect_is_shortened(defects, length):
+    """The defect at the start is one, and may rise fourfold. The shortest step is made whatever the defect."""
+    trials = iter(defects)
+    residual = SimpleNamespace(defect=1.0, lag=np.zeros((1, 2)), residual=np.zeros(2))
+    placed = SimpleNamespace(
+        clearances=lambda *_: np.zeros((2, 0)), iterate=lambda *_: SimpleNamespace(defect=next(trials)),
+        same_arcs=lambda _: True,
+        system=SimpleNamespace(strained=lambda _: SimpleNamespace(J=np.ones(1)),
+                               factored=lambda _: SimpleNamespace(solve=lambda *_: np.ones(2))))
+    start = SimpleNamespace(divided=lambda *each: each)
+    newton = contact_newton.Coupled(lambda: start, [], np.zeros((1, 2)), np.zeros(0))
+    newton.placed = placed
+    _, after = newton._step(residual)
+    assert newton.position == pytest.approx(length) and after.defect == defects[-1]
+
+
 def test_stationary_lines_stay_where_the_last_round_of_fluid_forces_left_them(plugged):
     """Lines that every round places anew can alternate between two places, one of them the end of an arc. The fluid's
     forces and the shape then never agree."""

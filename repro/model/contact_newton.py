@@ -199,7 +199,8 @@ class Coupled:
     def _step(self, iterate: growth.Iterate) -> tuple[bool, growth.Iterate]:
         """Make one step of shape and lines that keeps det F > 0.
 
-        Returns whether lines move, and the iterate after the step. A step that raises the defect by more than RISE is shortened.
+        Returns whether lines move, and the iterate after the step. A step that raises the defect by
+        more than RISE is shortened.
         """
         lag = iterate.lag
         carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(self.pressure))])
