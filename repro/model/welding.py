@@ -39,6 +39,7 @@ from repro.model.contact_lines import (
     MEET,
     PART_OF_ANGLE,
     ROUND_OFF,
+    Advances,
     Clearance,
     Contact,
     free_walk,
@@ -496,7 +497,7 @@ class Welding:
         shape: the equilibrium with these arcs. It is the result if ``within_arcs`` is False, if
         there is no equilibrium with a shorter one, or if its films are too thin.
         """
-        entire = Expansion(self._marked(shape), self._iterations)
+        entire = Expansion(self._marked(shape), self._iterations, advances=self._advances)
         inside = [k for k, front in enumerate(self._fronts) if front.joined and not front.new]
         if not (inside and self.within_arcs):
             return entire
@@ -526,7 +527,8 @@ class Welding:
         self._iterations += trial._iterations
         fronts = [trial._fronts[k] for k in inside]
         thin = np.array([front.too_thin(rest.mesh.points, front.joined) for front in fronts])
-        return thin, Expansion(trial._marked(rest), self._iterations, divisions=divisions)
+        return thin, Expansion(trial._marked(rest), self._iterations, divisions=divisions,
+                               advances=trial._advances)
 
     def _divided(self, shape: Pore, inside: Sequence[int],
                  t: np.ndarray) -> tuple[Welding, Pore, tuple[Division, ...]]:
@@ -579,6 +581,13 @@ class Welding:
     def _tied(self) -> np.ndarray:
         """(k, 2) nodes of all pairs that have joined."""
         return np.concatenate([notch.joined_nodes for notch in self._notches])
+
+    @property
+    def _advances(self) -> Advances:
+        """{(index of the aggregate, wall, direction): um}, advances of the contact lines."""
+        return {(self.group[line.sides[0]], line.wall.number, line.direction):
+                float(welds.lengths_from(line.outline, line.walk)[line.joined])
+                for line in self._lines}
 
     def _walls(self) -> list[np.ndarray]:
         """(M,) number of each aggregate's nodes, after corners have joined walls."""
