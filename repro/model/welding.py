@@ -503,17 +503,21 @@ class Welding:
             return entire
         too_short = np.zeros(len(inside))
         enough = np.ones(len(inside))
+        rounds = ceil(-log2(ARC_PART * self.mechanics.numerics.tolerance))
+        longer = 0.5**rounds
         with suppress(GrowthError, LinearError):
-            for _ in range(ceil(-log2(ARC_PART * self.mechanics.numerics.tolerance))):
+            for _ in range(rounds):
                 t = 0.5 * (too_short + enough)
                 thin, _ = self._ending_at(shape, inside, t)
                 too_short = np.where(thin, t, too_short)
                 enough = np.where(thin, enough, t)
-            shorter = [k for k, t in zip(inside, enough) if t < 1]
-            if shorter:
-                thin, expansion = self._ending_at(shape, shorter, enough[enough < 1])
+            while (within := enough < 1).any():
+                shorter = [k for k, each in zip(inside, within) if each]
+                thin, expansion = self._ending_at(shape, shorter, enough[within])
                 if not thin.any():
                     return expansion
+                enough[within] += longer * thin  # another front has become shorter since
+                longer *= 2
         return replace(entire, iterations=self._iterations)
 
     def _ending_at(self, shape: Pore, inside: Sequence[int],
