@@ -378,6 +378,9 @@ NEIGHBOURS = '{radius="10 um", position="-11.1 um"}', '{radius="8 um", position=
 #: Hours of uniform growth: of the state that one aggregate takes over, and of the compared states. At 2.2 h the two
 #: sides of this aggregate's notch cross in `accurate`; those of two aggregates weld.
 EVENLY, LANDED = 1.0, (2.0, 2.1)
+#: Accepted where the issue's bound for welds is missed: lengths of 3.3 and 3.4 um differ by 0.27 and 0.08 % in
+#: `accurate`, and by 0.04 % in `fast` and `exact`.
+LANDED_ACCEPTED = {("accurate", "length of contact"): 5e-3}
 
 
 @pytest.mark.slow
@@ -389,7 +392,7 @@ def test_landing(preset, bound, record):
     """Two aggregates that have welded on one wall grow evenly and land on the opposite wall as one aggregate with the
     outline of both does, whose contact lines another algorithm places. Their conductivity is the same.
 
-    Norm: largest relative differences at two times; tips from the fixed point at t = 0 of the larger aggregate.
+    Norm: largest relative differences at two times.
     """
     one, two = _landed(preset)
     for name in one:
@@ -397,10 +400,6 @@ def test_landing(preset, bound, record):
         limit = LANDED_ACCEPTED.get((preset, name), bound)
         origin = "the issue's bound for welds" if limit == bound else "the issue's bound for welds is missed"
         record(at_most(name, error, limit, origin))
-
-
-#: Accepted where the bound is missed.
-LANDED_ACCEPTED: dict[tuple[str, str], float] = {}
 
 
 def _landed(preset: str) -> list[dict[str, list[float]]]:
@@ -428,8 +427,8 @@ def _as_one(pore: Pore, scene: Scene) -> Pore:
                           topology.method))
     region, = space.mesh.regions
     first = pore.bodies[0]
-    body = replace(first, wall=outline.wall, fixed=outline.fixed, active=pore.active, inert=pore.inert, theta=np.ones(1),
-                   solid=material(space, region, mesh.points[region.nodes], first.solid.energy), line_speeds=None)
+    solid = material(space, region, mesh.points[region.nodes], first.solid.energy)
+    body = replace(first, wall=outline.wall, fixed=outline.fixed, active=pore.active, inert=pore.inert, solid=solid)
     return growing.with_restarted_theta(replace(pore, space=space, bodies=(body,), concentrations=None),
                                         scene.kinetics.maximum_density)
 
@@ -440,7 +439,8 @@ def _numbers(scene: Scene, pores: Sequence[Pore]) -> dict[str, list[float]]:
     named = {"conductivity": [], "area": [], "upstream": [], "downstream": [], "length of contact": []}
     for pore in pores:
         outlines = pore.outlines
-        numbers = (solver.solve(replace(pore, concentrations=None)).flow.conductivity, sum(each.area for each in outlines),
+        solved = solver.solve(replace(pore, concentrations=None))
+        numbers = (solved.flow.conductivity, sum(each.area for each in outlines),
                    min(each.upstream for each in outlines), max(each.downstream for each in outlines),
                    sum(each.contact_length(numbered(pore.mesh.walls, TOP)) for each in outlines))
         for values, number in zip(named.values(), numbers):
