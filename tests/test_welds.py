@@ -18,6 +18,7 @@ from repro.fem.walls import WELD, channel_walls, on_any
 from repro.march.ends import Ends, _meetings, _reason_against_weld, nearest_end
 from repro.model import adhesion, surface, welding
 from repro.model.contact import FORCE_REST, _lines_after
+from repro.model.contact_lines import Clearance, surface_ends
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import sized
 from repro.runs.status import is_over
@@ -748,3 +749,39 @@ def test_a_landed_group_has_small_triangles_where_its_lines_are_expected():
     assert len(_lines_after(last.pore, advances)) == 2
     assert max(advances.values()) < 0.1, "they are at rest"
     assert last.pore.bodies[0].line_speeds is not None
+
+
+def test_contact_lines_of_a_landed_group_advance_as_far_as_the_rule_requires():
+    """The contact is much longer than it was when it landed, and the clearance beyond a line that has advanced in the
+    last step is zero within that of a sixteenth of an arc."""
+    seeds, _ = LAND_FIRST
+    first, last = landed(on_wall(seeds, "lower"), 2.4)[-2:]
+    lengths = [report.pore.outlines[0].contact_length(report.pore.mesh.walls[1]) for report in (first, last)]
+    assert lengths[1] > 1.8 * lengths[0]
+    keys = scene_of(*SCENE).growth
+    rule = Clearance(last.pore.mesh.walls, keys.minimum_film, keys.minimum_contact_angle)
+    outline = last.pore.outlines[0]
+    clearances = [rule.beyond(outline, node, direction)[0] for node, direction in surface_ends(outline, 2)]
+    assert len(clearances) == 2 and min(clearances) > -0.02 and max(clearances) < 0.2
+
+
+def test_a_front_becomes_longer_if_its_film_is_too_thin_when_another_one_has_become_shorter(monkeypatch):
+    """The second one needs 0.2 of its arc if the first one has half, and 0.6 of it otherwise. Both are sought at
+    once."""
+    seeds, end = WELD_FIRST
+    pore = landed(on_wall(seeds, "lower"), end)[-1].pore
+    closing = welding.Welding(Mechanics.of(scene_of(*SCENE)), pore, pore, (0, 1))
+    for line in closing._lines[1:3]:
+        line.joined = 1
+    trials = []
+
+    def ending_at(closing, shape, inside, t):
+        first, second = trials[-1] if len(t) < 2 else t
+        trials.append((first, second))
+        return np.array([first < 0.3, second < (0.2 if first >= 0.45 else 0.6)]), "divided"
+
+    monkeypatch.setattr(welding.Welding, "_ending_at", ending_at)
+    assert closing._within_arcs(pore) == "divided"
+    first, second = trials[-1]
+    assert 0.3 <= first < 1 and (0.2 if first >= 0.45 else 0.6) <= second < 1
+    assert trials[-2] != trials[-1], "that after the search had a film that was too thin"

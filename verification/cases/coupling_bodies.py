@@ -14,8 +14,9 @@ from reference import gold_pair
 from repro import Meeting, load_scene, simulate, solve
 from repro.fem import welds
 from repro.fem.mesh import Mesh
+from repro.fem.outline import Outline
 from repro.fem.space import Space
-from repro.fem.walls import TOP, WELD, numbered
+from repro.fem.walls import FREE, TOP, WELD, numbered
 from repro.march.state import RestartState, contiguous
 from repro.march.step_control import StepControl
 from repro.model import contact, flow, growing, substrates
@@ -386,7 +387,7 @@ LANDED_ACCEPTED = {("accurate", "length of contact"): 5e-3}
 @pytest.mark.slow
 @pytest.mark.case(
     "coupling-weld-lands", kind="property", runs_with="fast accurate exact",
-    mutants=("weld-lands-on-a-point", "lines-of-a-weld-rest"), omitted="paper: the scene is refused")
+    mutants=("weld-lands-on-a-point",), omitted="paper: the scene is refused")
 @parametrize("preset, bound", {preset: (preset, bound) for preset, bound in WELD_AIMS.items()})
 def test_landing(preset, bound, record):
     """Two aggregates that have welded on one wall grow evenly and land on the opposite wall as one aggregate with the
@@ -446,3 +447,56 @@ def _numbers(scene: Scene, pores: Sequence[Pore]) -> dict[str, list[float]]:
         for values, number in zip(named.values(), numbers):
             values.append(number)
     return named
+
+
+#: Two neighbours in a pore of 14 um with a plane of symmetry. They weld at 0.1 h and land at 0.9 h. Hours of the
+#: compared states: from 2 h on their contact lines advance.
+BELOW_PLANE, ADVANCED = ('radius="11.9 um", position="-13.3 um"', 'radius="6 um", position="7 um"'), (2.5, 3.0)
+#: Accepted where the bound is missed.
+MIRROR_LANDED_ACCEPTED: dict[tuple[str, str], float] = {}
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-weld-lands-mirror", kind="property", runs_with="fast accurate", mutants=("lines-of-a-weld-rest",),
+    omitted="paper: the scene is refused; exact: see coupling-weld-lands")
+@parametrize("preset", {preset: (preset,) for preset in ("fast", "accurate")})
+def test_landing_mirror(preset, record):
+    """Two aggregates that have welded on one wall land on a plane of symmetry, and their contact lines advance, as their
+    group welds to its mirror image in a pore of twice the width.
+
+    Norm: largest relative differences at two times; of both pairs the larger one.
+    """
+    one, two = (_beside_plane(preset, pore) for pore in ("half", "whole"))
+    for name in one:
+        error = float(np.abs(two[name] / one[name] - 1).max())
+        limit = MIRROR_LANDED_ACCEPTED.get((preset, name), WELD_AIMS[preset])
+        origin = "the issue's bound for welds" if limit == WELD_AIMS[preset] else "the issue's bound for welds is missed"
+        record(at_most(name, error, limit, origin))
+
+
+def _beside_plane(preset: str, pore: str) -> dict[str, np.ndarray]:
+    """(times, pairs) numbers of the lower pair, and in the whole pore of the upper one."""
+    hours = [f"{hour} h" for hour in ADVANCED]
+    changes = {"half": ['pore.width="14 um"', 'pore.upper_wall="symmetry"'], "whole": ['pore.width="28 um"']}
+    walls = ["lower", "upper"][: 1 + (pore == "whole")]
+    seeds = ", ".join(f'{{{seed}, wall="{wall}"}}' for wall in walls for seed in BELOW_PLANE)
+    scene = load_scene("base", [
+        with_preset(preset), *changes[pore], f"aggregate=[{seeds}]", f'growth.end="{hours[-1]}"', f"output.times={hours}",
+        'pore.length="200 um"', 'flow.mean_velocity="2.9 m/day"', 'growth.time_step="3 min"'], unset=["flow.head"])
+    rows = []
+    for report in simulate(scene):
+        if report.pore.time in ADVANCED:
+            outlines = report.pore.outlines
+            pairs = [outlines[k: k + 2] for k in range(0, len(outlines), 2)]
+            assert report.pore.contact and report.pore.groups == [tuple(range(len(outlines)))]
+            rows.append([[report.solved.flow.conductivity, sum(each.area for each in pair),
+                          max(each.downstream for each in pair) - min(each.upstream for each in pair),
+                          _along_plane(pair[0])] for pair in pairs])
+    return dict(zip(("conductivity", "area", "length", "length of contact"), np.moveaxis(np.array(rows), 2, 0)))
+
+
+def _along_plane(outline: Outline) -> float:
+    """Length (um) of an outline's contact with the plane y = 14 um, or of its weld there."""
+    on = (outline.wall != FREE) & (np.abs(outline.points[:, 1] - 14.0) < 0.1)
+    return float(np.ptp(outline.points[on, 0]))
