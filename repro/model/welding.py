@@ -6,9 +6,11 @@ aggregate, so both aggregates keep the strain that they had before. A film betwe
 the same rule as a film at a wall (2.3.3): the gap must be at least min(film, tan(angle) d), where d
 is the distance from the end of the weld along the middle line of the film. Pairs of opposite nodes
 (:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. The two nodes of a
-pair first move to the point half way between them, and then to equilibrium. The last arcs that have
-joined are divided where the weld may end without a film that is too thin. Contact lines on walls
-advance by nodes.
+pair first move to the point half way between them, and then to equilibrium. Corners beside contact
+lines join a wall in the same search (:class:`Front`). The last arcs that have joined are divided
+where welds and contacts may end without a film that is too thin.
+
+Welded aggregates land on a wall that none of them touches (:func:`land`).
 """
 
 from __future__ import annotations
