@@ -156,7 +156,8 @@ def test_the_caption_about_arrangements_has_the_losses_of_their_runs(tmp_path, m
     caption = module.caption(*map(str, range(10)))
     assert missing(["before the last hour: two facing (constant head). ", "0.6 W²",
                     "one 0 %, two facing 10 %, two staggered 20 %", "pairs 30 %, eight alternating 40 %",
-                    "leaves 1.7 times", "conductivity as one than as eight", "by 5.0 percentage points"], caption) is None
+                    "leaves 1.7 times", "conductivity as one than as eight", "by 5.0 percentage points"],
+                   caption) is None
     meets.clear()
     assert "last hour" not in module.caption(*map(str, range(10)))
 
