@@ -452,8 +452,8 @@ def _numbers(scene: Scene, pores: Sequence[Pore]) -> dict[str, list[float]]:
 #: Two neighbours in a pore of 14 um with a plane of symmetry. They weld at 0.1 h and land at 0.9 h. Hours of the
 #: compared states: from 2 h on their contact lines advance.
 BELOW_PLANE, ADVANCED = ('radius="11.9 um", position="-13.3 um"', 'radius="6 um", position="7 um"'), (2.5, 3.0)
-#: Accepted where the bound is missed: lengths of 7.0 and 10.1 um differ by 0.25 and 1.08 % in `accurate`, because a weld
-#: does not become shorter. The conductivity differs by 0.038 % in `fast` and 0.009 % in `accurate`.
+#: Accepted where the bound is missed: lengths of 7.0 and 10.1 um differ by 0.25 and 1.08 % in `accurate`. Neither welds
+#: nor contacts become shorter. The conductivity differs by 0.038 % in `fast` and 0.009 % in `accurate`.
 MIRROR_LANDED_ACCEPTED = {("accurate", "length of contact"): 1.7e-2}
 
 
