@@ -23,6 +23,7 @@ from repro.model.mechanics import Mechanics
 from repro.model.meshing import sized
 from repro.runs.status import is_over
 from repro.scene import load_scene
+from verification.problems.runs import supplied_everywhere
 
 WIDTH = 30.0
 END = 0.5
@@ -785,3 +786,12 @@ def test_a_front_becomes_longer_if_its_film_is_too_thin_when_another_one_has_bec
     first, second = trials[-1]
     assert 0.3 <= first < 1 and (0.2 if first >= 0.45 else 0.6) <= second < 1
     assert trials[-2] != trials[-1], "that after the search had a film that was too thin"
+
+
+def test_new_arcs_in_an_acute_notch_do_not_cross():
+    """The notch beside the landed aggregate is almost closed at 2.5 h. Arcs that replaced its smallest ones crossed at
+    the line, so that no mesh could be made."""
+    changes = [*COMMON[:1], 'kinetics.decay_coefficient="0 1/d"', 'pore.length="300 um"', 'pore.width="14 um"',
+               'growth.end="2.5 h"', 'output.times=["1 h", "2 h"]', f"aggregate=[{', '.join(LAND_FIRST[0])}]"]
+    *_, last = repro.simulate(supplied_everywhere(load_scene("base", changes)))
+    assert last.pore.time == 2.0 and last.pore.welds == [(0, 1)] and last.pore.contact

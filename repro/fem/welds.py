@@ -215,8 +215,10 @@ def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     for place in range(len(notches(*outlines))):
         walks = in_notch(outlines, notches(*outlines)[place], sizing.film)
         lengths = lengths_from(outlines[0], walks[0])
-        outlines = _without_small_edges(outlines, walks, np.maximum(lengths - sizing.film, 0.0),
-                                        sizing)
+        merged = _without_small_edges(outlines, walks, np.maximum(lengths - sizing.film, 0.0),
+                                      sizing)
+        if _opens(notches(*merged)[place], merged):
+            outlines = merged
     along = _along_weld(*outlines)
     s = lengths_from(outlines[0], along[0])
     first, second = _without_small_edges(outlines, along, np.minimum(s, s[-1] - s), sizing)
@@ -224,6 +226,17 @@ def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     points = second.points.copy()
     points[on_second] = first.points[on_first]
     return [first, replace(second, points=points)]
+
+
+def _opens(walks: Sequence[np.ndarray], outlines: Sequence[Outline]) -> bool:
+    """Do the first arcs of a notch leave the line without crossing? Arcs that replace several may
+    cross there, because their directions differ from those of the old ones."""
+    chords, directions = [], []
+    for outline, walk in zip(outlines, walks):
+        line, middle, end = outline.points[walk[:3]]
+        chords.append(end - line)
+        directions.append(4 * middle - 3 * line - end)
+    return bool(np.linalg.det(chords) * np.linalg.det(directions) > 0)
 
 
 def _without_small_edges(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
