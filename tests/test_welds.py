@@ -779,13 +779,30 @@ def test_a_front_becomes_longer_if_its_film_is_too_thin_when_another_one_has_bec
     def ending_at(closing, shape, inside, t):
         first, second = trials[-1] if len(t) < 2 else t
         trials.append((first, second))
-        return np.array([first < 0.3, second < (0.2 if first >= 0.45 else 0.6)]), "divided"
+        return np.array([False, False, first < 0.3, second < (0.2 if first >= 0.45 else 0.6), False]), "divided"
 
     monkeypatch.setattr(welding.Welding, "_ending_at", ending_at)
     assert closing._within_arcs(pore) == "divided"
     first, second = trials[-1]
     assert 0.3 <= first < 1 and (0.2 if first >= 0.45 else 0.6) <= second < 1
     assert trials[-2] != trials[-1], "that after the search had a film that was too thin"
+
+
+def test_a_front_at_rest_joins_a_corner_if_its_film_is_too_thin_when_another_one_has_become_shorter(monkeypatch):
+    """The notch has not advanced with the others at the ends of their arcs. It then ends within an arc, too."""
+    seeds, end = WELD_FIRST
+    pore = landed(on_wall(seeds, "lower"), end)[-1].pore
+    closing = welding.Welding(Mechanics.of(scene_of(*SCENE)), pore, pore, (0, 1))
+    closing._lines[1].joined = 1
+    trials = []
+
+    def ending_at(closing, shape, inside, t):
+        trials.append(inside)
+        return np.array([not closing._notches[0].joined, *4 * [False]]), "divided"
+
+    monkeypatch.setattr(welding.Welding, "_ending_at", ending_at)
+    assert closing._within_arcs(pore) == "divided"
+    assert closing._notches[0].joined == 1 and trials[0] == [2] and trials[-1] == [0, 2]
 
 
 def test_new_arcs_in_an_acute_notch_do_not_cross():

@@ -225,11 +225,15 @@ class Front(ABC):
             middle = int(self.last_too_few + self.first_enough + 1) // 2
             self.joined = max(middle, int(self.first_enough) - int(self.step))
             self.step *= 1.5
-        elif self.last_too_few < self._last:
-            self.joined += 1
-            self.predict(points)
         else:
+            self.join_next()
+            self.predict(points)
+
+    def join_next(self) -> None:
+        """Join one more corner. Raises GrowthError if there is none."""
+        if self.joined == self._last:
             raise GrowthError(self.meets)
+        self.joined += 1
 
     def predict(self, points: np.ndarray) -> None:
         """Join one corner fewer than would close all thin films of a shape.
@@ -510,7 +514,7 @@ class Welding:
         with suppress(GrowthError, LinearError):
             for _ in range(rounds):
                 t = 0.5 * (too_short + enough)
-                thin, _ = self._ending_at(shape, inside, t)
+                thin = self._ending_at(shape, inside, t)[0][inside]
                 too_short = np.where(thin, t, too_short)
                 enough = np.where(thin, enough, t)
             while (within := enough < 1).any():
@@ -518,21 +522,26 @@ class Welding:
                 thin, expansion = self._ending_at(shape, shorter, enough[within])
                 if not thin.any():
                     return expansion
-                enough[within] += longer * thin  # another front has become shorter since
+                enough[within] += longer * thin[shorter]  # another one has become shorter since
                 longer *= 2
+                if others := [k for k in np.flatnonzero(thin) if k not in shorter]:
+                    tied = self._tied()
+                    for k in others:
+                        self._fronts[k].join_next()
+                    return self._within_arcs(self._joined(shape, tied))
         return replace(entire, iterations=self._iterations)
 
     def _ending_at(self, shape: Pore, inside: Sequence[int],
                    t: np.ndarray) -> tuple[np.ndarray, Expansion]:
-        """For each of some fronts, is a film too thin if it lies within its last arcs?
+        """For each front, is a film too thin if some of them lie within their last arcs?
 
         Also returns the equilibrium. Arguments are those of :meth:`_divided`.
         """
         trial, start, divisions = self._divided(shape, inside, t)
         rest = trial._equilibrium(start, trial._tied())
         self._iterations += trial._iterations
-        fronts = [trial._fronts[k] for k in inside]
-        thin = np.array([front.too_thin(rest.mesh.points, front.joined) for front in fronts])
+        thin = np.array([front.too_thin(rest.mesh.points, front.joined)
+                         for front in trial._fronts])
         return thin, Expansion(trial._marked(rest), self._iterations, divisions=divisions,
                                advances=trial._advances)
 
