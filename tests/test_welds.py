@@ -21,6 +21,7 @@ from repro.model.contact import FORCE_REST, _lines_after
 from repro.model.contact_lines import Clearance, surface_ends
 from repro.model.mechanics import Mechanics
 from repro.model.meshing import sized
+from repro.model.remeshing import Remeshing
 from repro.runs.status import is_over
 from repro.scene import load_scene
 from verification.problems.runs import supplied_everywhere
@@ -561,6 +562,18 @@ def test_two_aggregates_on_one_wall_become_one_that_only_scales(seeds):
                         *(np.sqrt(outline.area) for outline in outlines)])
     first, second = np.abs(lengths)
     assert second / first == pytest.approx(second[-1] / first[-1], rel=2e-3)
+
+
+@WALLS
+def test_the_node_of_a_weld_at_a_wall_stays_on_this_wall(wall, other):
+    """It has the number of both."""
+    pore = at_start(*(BESIDE if wall == "lower" else BESIDE_UP))
+    scene = scene_of(*SCENE)
+    joined = welding.join(Mechanics.of(scene), Remeshing.of(scene), pore, (0, 1), 0.0)
+    number = {"lower": 1, "upper": 2}[wall]
+    for outline in joined.outlines:
+        assert np.count_nonzero(outline.wall == number + WELD) == 1
+        assert (outline.touches(number) == (outline.points[:, 1] == {"lower": 0.0, "upper": WIDTH}[wall])).all()
 
 
 def test_a_contact_surface_of_two_aggregates_has_one_fixed_point():
