@@ -12,6 +12,7 @@ from matplotlib.patches import Wedge
 
 from paper_figures import states, style
 from paper_figures.runs import FAST, Request
+from repro.runs.status import COMPLETED
 from verification.problems.arrangements import ARRANGEMENTS, COMPARED, seeds
 from verification.problems.hard import clean_conductivity
 
@@ -31,7 +32,7 @@ def _request(name: str, drive: str) -> Request:
     flow, end = DRIVES[drive]
     label = f"{name.replace(' ', '_')}_{drive}"
     return Request("base", (FAST, seeds(ARRANGEMENTS[name], RADIUS), f"flow={flow}", f'growth.end="{end} h"',
-                            "growth.meeting=end", 'output.every="1 h"'), label)
+                            'output.every="1 h"'), label)
 
 
 KEYS = [(name, drive) for name in ARRANGEMENTS for drive in DRIVES]
@@ -115,14 +116,15 @@ def caption(*folders: Path) -> str:
     head = losses["head"]
     least, most = min(head, key=head.__getitem__), max(head, key=head.__getitem__)
     apart = max(abs(losses["velocity"][name] - head[name]) for name in head)
-    ends = [name for (name, drive), folder in zip(KEYS, folders)
-            if drive == "head" and "meet" in states.status(folder)]
+    ended = [f"{name} (constant {drive})" for (name, drive), folder in zip(KEYS, folders)
+             if states.status(folder) != COMPLETED]
+    early = f" These runs end before the last hour: {', '.join(ended)}." if ended else ""
     stated = ", ".join(f"{name} {100 * loss:.0f} %" for name, loss in head.items())
     factor = (1 - head[least]) / (1 - head[most])
     published = " to ".join(f"{100 * loss:.0f}" for loss in PUBLISHED)
     return ("The pore of Base with one to eight seeds of the same total area (preset `fast`). (a) The seeds. (b) "
-            "Conductivity over that of the clean pore, against the area of all aggregates. Curves of aggregates that "
-            f"face each other ({' and '.join(ends)}) end where two of them meet (growth.meeting = \"end\"). "
+            "Conductivity over that of the clean pore, against the area of all aggregates. Where two of them meet, "
+            f"they join, and the curve goes on (growth.meeting = \"weld\").{early} "
             f"(c) At an area of {COMPARED:g} W² the loss is: {stated}. So the same biomass leaves "
             f"{factor:.1f} times as much conductivity as {least} than as {most}. The drive changes a loss by "
             f"{100 * apart:.1f} percentage points at most. In micromodels Jiao et al. (2025) measured losses of "

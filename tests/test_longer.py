@@ -31,6 +31,9 @@ SCENES = {
     "fast, weld": ((0.28,), ["numerics.preset=fast", "growth.time_step=3 min", "growth.end=0.34 h",
                             "pore.length=200 um", "pore.width=30 um", "growth.meeting=weld",
                             'aggregate=[{radius="13.98 um"}, {radius="13.98 um", wall="upper"}]']),
+    "fast, landing": ((0.4,), ["numerics.preset=fast", "growth.end=0.5 h", "pore.length=200 um", "pore.width=14 um",
+                               'aggregate=[{radius="11.7 um", position="-12.8 um"}, '
+                               '{radius="8 um", position="9 um"}]']),
     "donor alone": ((0.4,), ["growth.end=1 h", "numerics.refinement=0.5", "substrates={donor={}}"]),
     "to the pore's end": ((8.0,), ["aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=2 h",
                                    "growth.end=9 h", "numerics.refinement=0.5"]),

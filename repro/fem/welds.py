@@ -22,7 +22,7 @@ from repro.fem import sizing as sizes_of
 from repro.fem.elements import ON_ARC
 from repro.fem.outline import Outline, area_beside_chord, parabola
 from repro.fem.sizing import Sizing, cut, placed
-from repro.fem.walls import FREE, WELD, touched
+from repro.fem.walls import FREE, WELD, Wall, touched
 
 #: Corners of the two surfaces are opposite if their arc lengths from the line differ by at most
 #: this part of the shortest edge beside them. Below 1/2, no corner has two opposite corners.
@@ -213,8 +213,10 @@ def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     for place in range(len(notches(*outlines))):
         walks = in_notch(outlines, notches(*outlines)[place], sizing.film)
         lengths = lengths_from(outlines[0], walks[0])
-        outlines = _without_small_edges(outlines, walks, np.maximum(lengths - sizing.film, 0.0),
-                                        sizing)
+        merged = _without_small_edges(outlines, walks, np.maximum(lengths - sizing.film, 0.0),
+                                      sizing)
+        if _opens(notches(*merged)[place], merged):
+            outlines = merged
     along = _along_weld(*outlines)
     s = lengths_from(outlines[0], along[0])
     first, second = _without_small_edges(outlines, along, np.minimum(s, s[-1] - s), sizing)
@@ -222,6 +224,17 @@ def _coarsened(outlines: Sequence[Outline], sizing: Sizing) -> list[Outline]:
     points = second.points.copy()
     points[on_second] = first.points[on_first]
     return [first, replace(second, points=points)]
+
+
+def _opens(walks: Sequence[np.ndarray], outlines: Sequence[Outline]) -> bool:
+    """Do the first arcs of a notch leave the line without crossing? Arcs that replace several may
+    cross there, because their directions differ from those of the old ones."""
+    chords, directions = [], []
+    for outline, walk in zip(outlines, walks):
+        line, middle, end = outline.points[walk[:3]]
+        chords.append(end - line)
+        directions.append(4 * middle - 3 * line - end)
+    return bool(np.linalg.det(chords) * np.linalg.det(directions) > 0)
 
 
 def _without_small_edges(outlines: Sequence[Outline], walks: Sequence[np.ndarray],
@@ -385,19 +398,38 @@ def facing(first: Outline, second: Outline, reach: float, weld: int = WELD,
     places = _nearest(first, second) if wall == FREE else (
         [_line_beside(first, second, wall), _line_beside(second, first, wall)])
     outlines = []
-    for outline, (edge, t) in zip((first, second), places):
-        edges = len(outline.points) // outline.geometry
-        node = outline.geometry * ((edge + round(t)) % edges)
-        if AT_CORNER < t < 1 - AT_CORNER:
-            outline = cut(outline, [(edge, t)])
-            node = outline.geometry * (edge + 1)
+    for outline, place in zip((first, second), places):
+        outline, node = _with_corner(outline, place)
         numbers = outline.wall.copy()
         numbers[node] += weld
-        outline = replace(outline, wall=numbers)
-        sides = [_free_from(outline, node, direction) for direction in (1, -1)]
-        outlines.append(cut(outline, [place for walk in sides if len(walk) > 1
-                                      for place in _places(outline, walk, np.array([reach]))]))
+        outlines.append(_with_sides(replace(outline, wall=numbers), node, reach))
     return outlines
+
+
+def landing(outline: Outline, wall: Wall, reach: float) -> tuple[Outline, np.ndarray]:
+    """The same curve with new corners: one at the point nearest to a wall, and one at the arc
+    length ``reach`` (um) on each side of it. Also returns this point (2,) um."""
+    t = np.linspace(0, 1, 65)
+    film = wall.film(np.einsum("ta,kai->kti", parabola(t), outline.arcs(outline.points)))
+    edge, part = np.unravel_index(np.argmin(film), film.shape)
+    outline, node = _with_corner(outline, (int(edge), float(t[part])))
+    return _with_sides(outline, node, reach), outline.points[node]
+
+
+def _with_corner(outline: Outline, place: tuple[int, float]) -> tuple[Outline, int]:
+    """The same curve with a corner at (edge, t), and its node."""
+    edge, t = place
+    if AT_CORNER < t < 1 - AT_CORNER:
+        return cut(outline, [place]), outline.geometry * (edge + 1)
+    edges = len(outline.points) // outline.geometry
+    return outline, outline.geometry * ((edge + round(t)) % edges)
+
+
+def _with_sides(outline: Outline, node: int, reach: float) -> Outline:
+    """The same curve with a corner at the arc length ``reach`` (um) on each side of a node."""
+    sides = [_free_from(outline, node, direction) for direction in (1, -1)]
+    return cut(outline, [place for walk in sides if len(walk) > 1
+                         for place in _places(outline, walk, np.array([reach]))])
 
 
 def _line_beside(outline: Outline, other: Outline, wall: int) -> tuple[int, float]:

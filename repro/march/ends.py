@@ -23,8 +23,9 @@ walls cannot hold the aggregate, or if erosion removes a contact surface: the mo
 surface that becomes free.
 
 With growth.meeting = "weld", two aggregates that meet join (:mod:`repro.model.welding`), and the
-run continues. If their weld would enclose water, or if :attr:`repro.Scene.without_weld` gives a
-reason, the run ends, and its message says why.
+run continues. So it does when a welded aggregate joins a wall that no aggregate of its group
+touches. If a weld or such a contact would enclose water, or if :attr:`repro.Scene.without_weld`
+gives a reason, the run ends, and its message says why.
 
 With growth.until = "steady", a run also ends after a step in which the aggregates hardly change
 (:func:`steadiness`). This end is not located.
@@ -97,7 +98,8 @@ class Meeting(RunEnd):
     continues, unless the weld would enclose water. Two aggregates on opposite walls enclose none.
     Two on one wall enclose none if they meet at this wall. A run also ends if a surface touches
     itself so that water is enclosed, if welded aggregates touch in a second place, if a surface
-    touches a wall in a second place, and if a welded aggregate reaches a further wall.
+    touches a wall in a second place, and if a welded aggregate reaches a wall that another one
+    touches already.
 
     :func:`repro.simulate` raises it after the last Report. It is an end of the model, not a
     failure: the message names the time (h), the aggregates and the coordinates (um).
@@ -160,13 +162,15 @@ class Event:
 
     leaves: index of the aggregate that leaves the pore if growth.after_detachment = "continue";
     None if the run ends. joins: indices of two aggregates that join, so that the run continues;
-    None if the run ends.
+    lands: index of a welded aggregate and number of the wall that it joins, so that the run
+    continues; None if the run ends.
     """
 
     margin: float
     end: RunEnd
     leaves: int | None = None
     joins: tuple[int, int] | None = None
+    lands: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,6 +199,11 @@ class Reached:
     def joins(self) -> tuple[int, int] | None:
         """Indices of two aggregates that join at the end of the step; None if none join."""
         return self.event.joins if self.event.margin > 0 else None
+
+    @property
+    def lands(self) -> tuple[int, int] | None:
+        """Index of a welded aggregate and number of the wall that it joins; None if none does."""
+        return self.event.lands if self.event.margin > 0 else None
 
     def leaves(self, continues: bool) -> int | None:
         """Index of the aggregate that leaves the pore at the end of the step; None if none leaves.
@@ -393,20 +402,22 @@ def _between_lines(pore: Pore, pair: tuple[int, int], wall: int) -> float:
 
 
 def _further_contacts(least: float, pore: Pore, group: tuple[int, ...]) -> Iterator[Event]:
-    """The events of welded aggregates that reach a further wall, where the model has no contact for
-    them; group: their indices; least: um, growth.minimum_film."""
+    """The events of welded aggregates that reach a further wall.
+
+    The run ends if their group touches this wall already. group: their indices; least: um,
+    growth.minimum_film.
+    """
     for number in group:
         outline = pore.outlines[number]
+        others = _names(pore, tuple(other for other in group if other != number))
         for wall in outline.untouched(pore.mesh.walls):
             film, x = outline.nearest(wall)
-            others = _names(pore, tuple(other for other in group if other != number))
-            reason = ("this would enclose water beside a weld"
-                      if wall.number in pore.walls_of(group) else
-                      "the model has no further contact of welded aggregates")
             end = Meeting(f"{pore.name_of(number)} touches the wall y = {wall.y:g} um at "
                           f"t = {pore.time:g} h: near x = {x:.4g} um the film is "
-                          f"{_closes(film, least)}; it is welded to {others}, and {reason}")
-            yield Event(1 - film / least, end)
+                          f"{_closes(film, least)}; it is welded to {others}, and this would "
+                          "enclose water beside a weld")
+            encloses = wall.number in pore.walls_of(group)
+            yield Event(1 - film / least, end, lands=None if encloses else (number, wall.number))
 
 
 def _films(pore: Pore) -> Iterator[tuple[tuple[int, int], float, np.ndarray]]:

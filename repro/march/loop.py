@@ -9,9 +9,9 @@ a later end restarts from the state before the cut step.
 
 A step ends at a jump of the scene's tables. Its row has the state just after the jump: with fluid
 forces the aggregate takes its new equilibrium there, as at t = 0 (:func:`settle`). A step also ends
-when an aggregate leaves the pore (``growth.after_detachment``) or when two aggregates join
-(``growth.meeting``). Its row has the state just after this event, and its ledger contains the mass
-that has left.
+when an aggregate leaves the pore (``growth.after_detachment``), when two aggregates join
+(``growth.meeting``) or when a welded one joins a wall. Its row has the state just after this event,
+and its ledger contains the mass that has left.
 """
 
 from __future__ import annotations
@@ -211,7 +211,11 @@ def _advance(course: Course, state: RestartState, pore: Pore, solved: Solved,
     while True:
         leaves = end.leaves(stages.growth.continues)
         if end.joins is not None:
-            end = reached(*_after_meeting(stages, end, end.joins))
+            welded = stages.weld(end.step.pore, end.joins, end.solved)
+            end = reached(*_after_meeting(stages, end.step, welded))
+        elif end.lands is not None:
+            landed = stages.land(end.step.pore, end.lands, end.solved)
+            end = reached(*_after_meeting(stages, end.step, landed))
         elif leaves is not None:
             end = reached(*_after_detachment(stages, end, leaves))
         else:
@@ -232,12 +236,12 @@ def _after_detachment(stages: Stages, reached: Reached,
                    departed=departed), solved
 
 
-def _after_meeting(stages: Stages, reached: Reached,
-                   pair: tuple[int, int]) -> tuple[StepResult, Solved]:
-    """Return the state just after two aggregates have joined; pair: their indices."""
-    step = reached.step
-    welded = stages.weld(step.pore, pair, reached.solved)
-    after, solved = settle(stages, *stages.grading.solve(welded))
+def _after_meeting(stages: Stages, step: StepResult, joined: Pore) -> tuple[StepResult, Solved]:
+    """Return the state just after two aggregates, or one and a wall, have joined.
+
+    step: it ends when they meet; joined: the pore with the new weld or contact.
+    """
+    after, solved = settle(stages, *stages.grading.solve(joined))
     ledger = replace(step.ledger, biomass_after=after.mass)
     return replace(step, pore=contiguous(after), ledger=ledger, remeshed=True), solved
 

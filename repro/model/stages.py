@@ -90,6 +90,11 @@ class Stages:
         from repro.model import welding  # a run without a weld does not load it
         return welding.join(self.mechanics, self.remeshing, pore, pair, solved.mean_velocity)
 
+    def land(self, pore: Pore, place: tuple[int, int], solved: Solved) -> Pore:
+        """The pore after a welded aggregate has touched a wall, by :func:`welding.land`."""
+        from repro.model import welding
+        return welding.land(self.mechanics, self.remeshing, pore, place, solved.mean_velocity)
+
     def new_mesh(self, previous: Pore, expanded: Pore, solved: Solved,
                  generated: Sequence[GeneratedMesh] = ()) -> tuple[Pore, bool]:
         """Give expanded aggregates a mesh, by :func:`remeshing.new_mesh`."""

@@ -6,18 +6,22 @@ aggregate, so both aggregates keep the strain that they had before. A film betwe
 the same rule as a film at a wall (2.3.3): the gap must be at least min(film, tan(angle) d), where d
 is the distance from the end of the weld along the middle line of the film. Pairs of opposite nodes
 (:mod:`repro.fem.welds`) join, one after the other, until no film is too thin. The two nodes of a
-pair first move to the point half way between them, and then to equilibrium. The last arcs that have
-joined are divided where the weld may end without a film that is too thin. Contact lines on walls
-advance by nodes.
+pair first move to the point half way between them, and then to equilibrium. Corners beside contact
+lines join a wall in the same search (:class:`Front`). The last arcs that have joined are divided
+where welds and contacts may end without a film that is too thin.
+
+Welded aggregates land on a wall that none of them touches (:func:`land`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil, inf, log2
+from typing import ClassVar
 
 import numpy as np
 
@@ -27,11 +31,22 @@ from repro.fem.division import Division
 from repro.fem.forms import Basis, basis
 from repro.fem.mesh import Mesh, Region
 from repro.fem.outline import Outline
-from repro.fem.walls import FREE, WELD, touched
+from repro.fem.walls import FREE, WELD, Wall, numbered, touched
 from repro.model import growth, remeshing
 from repro.model.closing_by_lines import FIRST_LENGTHS, divided
-from repro.model.closing_by_nodes import closing_nodes
-from repro.model.contact_lines import ANGLE_FROM, AT_PLACES, PART_OF_ANGLE, ROUND_OFF, Contact
+from repro.model.contact_lines import (
+    ANGLE_FROM,
+    AT_PLACES,
+    CLOSE,
+    MEET,
+    PART_OF_ANGLE,
+    ROUND_OFF,
+    Advances,
+    Clearance,
+    Contact,
+    free_walk,
+    surface_ends,
+)
 from repro.model.mechanics import (
     CONTACT_ROUNDS,
     Expansion,
@@ -70,17 +85,42 @@ def join(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, in
     with this length, the weld has half of it, or a quarter. speed: as for
     :func:`remeshing.remesh`. Raises GrowthError, LinearError or MeshError.
     """
+    return _with_first_length(mechanics, rules, pore, speed, pair[0],
+                              lambda length: _facing(rules, pore, pair, speed, length))
+
+
+def land(mechanics: Mechanics, rules: Remeshing, pore: Pore, place: tuple[int, int],
+         speed: float) -> Pore:
+    """The pore after a welded aggregate has touched a wall; place: its index and the wall's number.
+
+    Contact begins at the nearest point, and extends as a new weld does. Arguments and errors are
+    otherwise those of :func:`join`.
+    """
+    return _with_first_length(mechanics, rules, pore, speed, place[0],
+                              lambda length: _landing(rules, pore, place, speed, length))
+
+
+def _with_first_length(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed: float,
+                       number: int, begin: Callable[[float], Pore]) -> Pore:
+    """The pore with a new weld or a new contact of the aggregate with the index ``number``.
+
+    begin: begin(length) is the pore on a mesh with the first node of it, and with corners at a
+    length (um) on each side of this node. Other arguments are those of :func:`join`.
+    """
     for length in mechanics.keys.minimum_film * FIRST_LENGTHS:
         try:
-            return _joined_along(mechanics, rules, pore, pair, speed, length)
+            start = begin(length)
+            group = start.group_of(number)
+            shape = Welding(mechanics, start, start, group, reach=length).close()
+            return remeshing.remesh(rules, start, shape.pore, speed)[0]
         except (GrowthError, LinearError, MeshError) as error:
             failure = error
     raise failure
 
 
-def _joined_along(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tuple[int, int],
-                  speed: float, length: float) -> Pore:
-    """:func:`join` with a weld that extends by a length (um)."""
+def _facing(rules: Remeshing, pore: Pore, pair: tuple[int, int], speed: float,
+            length: float) -> Pore:
+    """The pore with the first node of a weld of two aggregates (:func:`_with_first_length`)."""
     outlines = list(pore.outlines)
     weld = WELD + max([0, *(number for each in outlines for number in welds.welds_of(each.wall))])
     first, second = pair
@@ -88,10 +128,21 @@ def _joined_along(mechanics: Mechanics, rules: Remeshing, pore: Pore, pair: tupl
     outlines[first], outlines[second] = welds.facing(
         outlines[first], outlines[second], length, weld, wall)
     facing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
-    group = facing.group_of(first)
-    facing = with_one_point(facing, group)
-    shape = Welding(mechanics, facing, facing, group, reach=length).close()
-    return remeshing.remesh(rules, facing, shape.pore, speed)[0]
+    return with_one_point(facing, facing.group_of(first))
+
+
+def _landing(rules: Remeshing, pore: Pore, place: tuple[int, int], speed: float,
+             length: float) -> Pore:
+    """The pore with the first node on a wall (:func:`_with_first_length`), still off the wall."""
+    number, wall = place
+    outlines = list(pore.outlines)
+    outlines[number], point = welds.landing(outlines[number], numbered(pore.mesh.walls, wall),
+                                            length)
+    landing, _ = remeshing.remesh(rules, pore, pore, speed, outlines=outlines)
+    outline = landing.outlines[number]
+    numbers = outline.wall.copy()
+    numbers[np.linalg.norm(outline.points - point, axis=1).argmin()] = wall
+    return landing.focused(number).with_body(wall=numbers).focused(None)
 
 
 def with_one_point(pore: Pore, group: Sequence[int]) -> Pore:
@@ -120,80 +171,112 @@ def with_one_point(pore: Pore, group: Sequence[int]) -> Pore:
     return replace(pore, bodies=tuple(bodies))
 
 
-@dataclass(eq=False)
-class Notch:
-    """The water at one end of a weld.
+@dataclass(eq=False, kw_only=True)
+class Front(ABC):
+    """The water at one end of a weld, or beside a contact line.
 
-    weld: its number; sides: its two aggregates, as indices into their group; pairs: (k, 2) opposite
-    nodes of the mesh, from the line on; before: (k, 2, 2) um, their positions in the old shape;
-    size: number of nodes from corner to corner; film: least film (um); slope: tangent of the least
-    angle; new: have the two aggregates just met? joined: number of pairs of corners beyond the old
-    line that have joined, in the present trial; last_too_few: largest number of pairs for which a
-    film is too thin; first_enough: smallest number for which no film is too thin; step: the next
-    trial has at most this many pairs fewer.
+    sides: the aggregates beside it, as indices into their group; size: number of nodes from corner
+    to corner; new: has the weld or the contact just begun? joined: number of corners beyond the old
+    line that have joined, in the present trial; last_too_few: largest number for which a film is
+    too thin; first_enough: smallest number for which no film is too thin; step: the next trial has
+    at most this many corners fewer.
     """
 
-    weld: int
-    sides: tuple[int, int]
-    pairs: np.ndarray
-    before: np.ndarray
-    size: int
-    film: float
-    slope: float
     new: bool
     joined: int = 0
     first_enough: float = inf
     step: float = 1.0
+    sides: tuple[int, ...]
+    size: int
+    meets: ClassVar[str]
 
     def __post_init__(self) -> None:
         self.last_too_few = self.joined - 1
 
     @property
-    def tied(self) -> np.ndarray:
-        """(k, 2) pairs that have joined."""
-        return self.pairs[: self.size * self.joined + 1]
+    @abstractmethod
+    def nodes(self) -> np.ndarray:
+        """(k, sides) nodes of the mesh beyond the line, on each side."""
+
+    @property
+    def joined_nodes(self) -> np.ndarray:
+        """(j, sides) nodes that have joined."""
+        return self.nodes[: self.size * self.joined + 1]
 
     @property
     def _last(self) -> int:
-        """The largest number of pairs that may join."""
-        return (len(self.pairs) - 1) // self.size - 1
+        """The largest number of corners that may join."""
+        return (len(self.nodes) - 1) // self.size - 1
 
     def advance(self, points: np.ndarray) -> None:
         """Go to the next trial; points: (N, 2) um, of the mesh in the present trial.
 
-        While a film is too thin, all pairs up to it join. Then fewer pairs join, until the smallest
-        number without a thin film is known. Raises GrowthError if there are no further pairs.
+        While a film is too thin, all corners up to it join. Then fewer corners join, until the
+        smallest number without a thin film is known. Raises GrowthError if there are no further
+        corners.
         """
         if not self.too_thin(points, self.joined):
             self.first_enough = self.joined
         else:
             self.last_too_few = self.joined
-            if self.first_enough <= self.joined:  # the other notch has moved since
+            if self.first_enough <= self.joined:  # another front has moved since
                 self.first_enough, self.step = inf, 1.0
         if self.first_enough < inf:
             middle = int(self.last_too_few + self.first_enough + 1) // 2
             self.joined = max(middle, int(self.first_enough) - int(self.step))
             self.step *= 1.5
-        elif self.last_too_few < self._last:
-            self.joined += 1
-            self.predict(points)
         else:
-            raise GrowthError("the weld advances beyond the nodes that are opposite each other")
+            self.join_next()
+            self.predict(points)
+
+    def join_next(self) -> None:
+        """Join one more corner. Raises GrowthError if there is none."""
+        if self.joined == self._last:
+            raise GrowthError(self.meets)
+        self.joined += 1
 
     def predict(self, points: np.ndarray) -> None:
-        """Join one pair fewer than would close all thin films of a shape.
+        """Join one corner fewer than would close all thin films of a shape.
 
-        points: (N, 2) um, nodes of its mesh. A joined pair opens the films beside it, so the last
-        pair is usually not needed.
+        points: (N, 2) um, nodes of its mesh. A joined corner opens the films beside it, so the last
+        corner is usually not needed.
         """
         joined = self.joined
         while joined < self._last and self.too_thin(points, joined):
             joined += 1
         self.joined = max(joined - 1, self.joined)
 
+    @abstractmethod
     def too_thin(self, points: np.ndarray, joined: int) -> bool:
-        """Is a film thinner than the rule requires? Close to the line the rule requires less, as in
-        :mod:`repro.model.contact_lines`."""
+        """Is a film thinner than the rule requires, if a number of corners have joined?
+
+        points: (N, 2) um, nodes of the mesh.
+        """
+
+
+@dataclass(eq=False)
+class Notch(Front):
+    """The water at one end of a weld.
+
+    weld: its number; pairs: (k, 2) opposite nodes of the mesh, from the line on; before: (k, 2, 2)
+    um, their positions in the old shape; film: least film (um); slope: tangent of the least angle.
+    """
+
+    weld: int
+    pairs: np.ndarray
+    before: np.ndarray
+    film: float
+    slope: float
+    meets: ClassVar[str] = "the weld advances beyond the nodes that are opposite each other"
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """(k, 2) pairs of opposite nodes."""
+        return self.pairs
+
+    def too_thin(self, points: np.ndarray, joined: int) -> bool:
+        """Is a film between the aggregates too thin? Close to the line the rule requires less, as
+        in :mod:`repro.model.contact_lines`."""
         free = self.pairs[self.size * joined:]
         one, two = _along_arcs(points[free])
         before = _along_arcs(self.before[self.size * joined:])
@@ -207,6 +290,42 @@ class Notch:
         needs = np.minimum(self.film, self.slope * along)
         needs[along < ANGLE_FROM * (1 - ROUND_OFF) * self.film / self.slope] *= PART_OF_ANGLE
         return bool((gap < needs).any())
+
+
+@dataclass(eq=False)
+class WallLine(Front):
+    """The water beside a contact line of a welded aggregate.
+
+    wall: the wall; outline: of the aggregate in the old shape; walk: (k,) its nodes from the line
+    on; direction: 1 or -1, along the outline; loop: (M,) nodes of the mesh on the outline; rule:
+    for films at the walls.
+    """
+
+    wall: Wall
+    outline: Outline
+    walk: np.ndarray
+    direction: int
+    loop: np.ndarray
+    rule: Clearance
+    meets: ClassVar[str] = MEET
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """(k, 1) nodes of the mesh beyond the line."""
+        return self.loop[self.walk, None]
+
+    def marked(self, numbers: np.ndarray, joined: int) -> np.ndarray:
+        """Numbers (M,) of the outline's nodes, after corners have joined the wall."""
+        marked = numbers.copy()
+        marked[self.walk[1: self.size * joined + 1]] = self.wall.number
+        return marked
+
+    def too_thin(self, points: np.ndarray, joined: int) -> bool:
+        """Is the clearance beyond the line negative (:class:`Clearance`)?"""
+        outline = replace(self.outline, points=points[self.loop],
+                          wall=self.marked(self.outline.wall, joined))
+        line = int(self.walk[self.size * joined])
+        return self.rule.beyond(outline, line, self.direction)[0] < -CLOSE
 
 
 def _along_arcs(nodes: np.ndarray) -> np.ndarray:
@@ -272,6 +391,12 @@ class Welding:
     def __post_init__(self) -> None:
         self._iterations = 0
         self._notches = [self._notch(sides, walks) for sides, walks in self._walks()]
+        self._lines = list(self._wall_lines())
+
+    @property
+    def _fronts(self) -> list[Front]:
+        """The ends of welds, then the contact lines."""
+        return [*self._notches, *self._lines]
 
     @property
     def _outlines(self) -> list[Outline]:
@@ -308,8 +433,26 @@ class Welding:
         joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
         pairs = np.column_stack([self._loops[side][walk] for side, walk in zip(sides, walks)])
         pairs = pairs[: self._before_valley(mesh.points[pairs]) + 1]
-        return Notch(weld, sides, pairs, mesh.points[pairs], mesh.geometry, keys.minimum_film,
-                     np.tan(keys.minimum_contact_angle), new, joined)
+        return Notch(weld, pairs, mesh.points[pairs], keys.minimum_film,
+                     np.tan(keys.minimum_contact_angle), sides=sides, size=mesh.geometry, new=new,
+                     joined=joined)
+
+    def _wall_lines(self) -> Iterator[WallLine]:
+        """The contact lines beside which there is a free surface."""
+        mesh = self.grown.mesh
+        keys = self.mechanics.keys
+        rule = Clearance(mesh.walls, keys.minimum_film, keys.minimum_contact_angle,
+                         self.mechanics.numerics.tolerance)
+        for side, (outline, loop) in enumerate(zip(self._outlines, self._loops)):
+            for wall in mesh.walls:
+                new = np.count_nonzero(outline.touches(wall.number)) == 1
+                for node, direction in surface_ends(outline, wall.number):
+                    if outline.wall[node] == wall.number:  # no weld begins there
+                        walk = free_walk(outline, node, direction)
+                        lengths = welds.lengths_from(outline, walk)
+                        joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
+                        yield WallLine(wall, outline, walk, direction, loop, rule, sides=(side,),
+                                       size=mesh.geometry, new=new, joined=joined)
 
     def _before_valley(self, nodes: np.ndarray) -> int:
         """Index of the last pair of corners that may join; nodes: (k, 2, 2) um, opposite pairs.
@@ -337,84 +480,86 @@ class Welding:
         for number, region in zip(self.group, self._regions):
             shape = shape.focused(number).placed(self.start.mesh.points[region.nodes],
                                                  self.start.pressure[region.corner_nodes])
-        joined = [notch for notch in self._notches if not notch.new]
-        tied = np.concatenate([np.empty((0, 2), int), *(notch.tied for notch in joined)])
-        for notch in joined:
-            notch.predict(shape.mesh.points)
-        equilibria: dict[tuple[int, ...], Pore] = {}  # of trials with the same walls
+        tied = np.concatenate([np.empty((0, 2), int),
+                               *(notch.joined_nodes for notch in self._notches if not notch.new)])
+        for front in self._fronts:
+            if not front.new:
+                front.predict(shape.mesh.points)
+        equilibria: dict[tuple[int, ...], Pore] = {}
         for _ in range(CONTACT_ROUNDS):
-            joins = tuple(notch.joined for notch in self._notches)
+            joins = tuple(front.joined for front in self._fronts)
             shape = equilibria[joins] if joins in equilibria else self._joined(shape, tied)
             equilibria[joins] = shape
             tied = self._tied()
-            for notch in self._notches:
-                notch.advance(shape.mesh.points)
-            walls = [self._closing(shape, number) for number in self.group]
-            if any((wall != FREE).any() for wall in walls):
-                equilibria = {}
-            elif np.array_equal(self._tied(), tied):
+            for front in self._fronts:
+                front.advance(shape.mesh.points)
+            if joins == tuple(front.joined for front in self._fronts):
                 return self._within_arcs(shape)
-            for number, wall in zip(self.group, walls):
-                seen = shape.focused(number)
-                shape = seen.with_body(wall=np.where(wall != FREE, wall, seen.body.wall))
         raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
 
     def _within_arcs(self, shape: Pore) -> Expansion:
-        """The shape with each end of the weld within the last arcs that have joined.
+        """The shape with each end of a weld and each contact line within the last arcs that joined.
 
         shape: the equilibrium with these arcs. It is the result if ``within_arcs`` is False, if
-        there is no equilibrium with a shorter weld, or if its films are too thin.
+        there is no equilibrium with a shorter one, or if its films are too thin.
         """
-        entire = Expansion(self._marked(shape), self._iterations)
-        inside = [k for k, notch in enumerate(self._notches) if notch.joined and not notch.new]
+        entire = Expansion(self._marked(shape), self._iterations, advances=self._advances)
+        inside = [k for k, front in enumerate(self._fronts) if front.joined and not front.new]
         if not (inside and self.within_arcs):
             return entire
         too_short = np.zeros(len(inside))
         enough = np.ones(len(inside))
+        rounds = ceil(-log2(ARC_PART * self.mechanics.numerics.tolerance))
+        longer = 0.5**rounds
         with suppress(GrowthError, LinearError):
-            for _ in range(ceil(-log2(ARC_PART * self.mechanics.numerics.tolerance))):
+            for _ in range(rounds):
                 t = 0.5 * (too_short + enough)
-                thin, _ = self._ending_at(shape, inside, t)
+                thin = self._ending_at(shape, inside, t)[0][inside]
                 too_short = np.where(thin, t, too_short)
                 enough = np.where(thin, enough, t)
-            shorter = [k for k, t in zip(inside, enough) if t < 1]
-            if shorter:
-                thin, expansion = self._ending_at(shape, shorter, enough[enough < 1])
+            while (within := enough < 1).any():
+                shorter = [k for k, each in zip(inside, within) if each]
+                thin, expansion = self._ending_at(shape, shorter, enough[within])
                 if not thin.any():
                     return expansion
+                enough[within] += longer * thin[shorter]  # another one has become shorter since
+                longer *= 2
+                if others := [k for k in np.flatnonzero(thin) if k not in shorter]:
+                    tied = self._tied()
+                    for k in others:
+                        self._fronts[k].join_next()
+                    return self._within_arcs(self._joined(shape, tied))
         return replace(entire, iterations=self._iterations)
 
     def _ending_at(self, shape: Pore, inside: Sequence[int],
                    t: np.ndarray) -> tuple[np.ndarray, Expansion]:
-        """For each notch, is a film too thin if the weld ends within its last arcs?
+        """For each front, is a film too thin if some of them lie within their last arcs?
 
         Also returns the equilibrium. Arguments are those of :meth:`_divided`.
         """
         trial, start, divisions = self._divided(shape, inside, t)
         rest = trial._equilibrium(start, trial._tied())
         self._iterations += trial._iterations
-        notches = [trial._notches[k] for k in inside]
-        thin = np.array([notch.too_thin(rest.mesh.points, notch.joined) for notch in notches])
-        return thin, Expansion(trial._marked(rest), self._iterations, divisions=divisions)
+        thin = np.array([front.too_thin(rest.mesh.points, front.joined)
+                         for front in trial._fronts])
+        return thin, Expansion(trial._marked(rest), self._iterations, divisions=divisions,
+                               advances=trial._advances)
 
     def _divided(self, shape: Pore, inside: Sequence[int],
                  t: np.ndarray) -> tuple[Welding, Pore, tuple[Division, ...]]:
-        """The closing on a mesh with the last arcs of notches divided, and the shape on this mesh.
+        """The closing on a mesh with the last arcs of fronts divided, and the shape on this mesh.
 
-        inside: indices of the notches; t: where their arcs are divided, from the line to the free
+        inside: indices of the fronts; t: where their arcs are divided, from the line to the free
         surface.
         """
         grown = self.grown
-        for number in self.group:
-            rest = shape.bodies[number]
-            grown = grown.focused(number).with_body(wall=rest.wall, fixed=rest.fixed)
         points = shape.mesh.points
         pressure = shape.pressure
         forces = self.forces
         divisions = []
         for side, number in enumerate(self.group):
             own = [self._last_arc(k, side, part) for k, part in zip(inside, t)
-                   if side in self._notches[k].sides]
+                   if side in self._fronts[k].sides]
             if not own:
                 continue
             arcs, at = zip(*own)
@@ -434,13 +579,15 @@ class Welding:
             pairs = np.column_stack([trial._loops[side][walk[:nodes]]
                                      for side, walk in zip(sides, walks)])
             trial._notches[k] = replace(notch, pairs=pairs, before=grown.mesh.points[pairs])
+        for line, own_line in zip(self._lines, trial._lines, strict=True):
+            own_line.joined = line.joined
         return trial, start, tuple(divisions)
 
     def _last_arc(self, k: int, side: int, t: float) -> tuple[int, float]:
-        """The last joined arc of a notch on one outline, and the place along the loop that is
+        """The last joined arc of a front on one outline, and the place along the loop that is
         ``t`` along the arc from the line."""
-        notch = self._notches[k]
-        middle, end = notch.tied[-2:, notch.sides.index(side)]
+        front = self._fronts[k]
+        middle, end = front.joined_nodes[-2:, front.sides.index(side)]
         loop = self._loops[side]
         node = int(np.flatnonzero(loop == middle)[0])
         forward = loop[(node + 1) % len(loop)] == end
@@ -448,7 +595,22 @@ class Welding:
 
     def _tied(self) -> np.ndarray:
         """(k, 2) nodes of all pairs that have joined."""
-        return np.concatenate([notch.tied for notch in self._notches])
+        return np.concatenate([notch.joined_nodes for notch in self._notches])
+
+    @property
+    def _advances(self) -> Advances:
+        """{(index of the aggregate, wall, direction): um}, advances of the contact lines."""
+        return {(self.group[line.sides[0]], line.wall.number, line.direction):
+                float(welds.lengths_from(line.outline, line.walk)[line.joined])
+                for line in self._lines}
+
+    def _walls(self) -> list[np.ndarray]:
+        """(M,) number of each aggregate's nodes, after corners have joined walls."""
+        walls = [outline.wall for outline in self._outlines]
+        for line in self._lines:
+            side, = line.sides
+            walls[side] = line.marked(walls[side], line.joined)
+        return walls
 
     def _joined(self, shape: Pore, tied: np.ndarray) -> Pore:
         """The equilibrium after further pairs have joined half way between their nodes.
@@ -475,7 +637,8 @@ class Welding:
         grown = self.grown
         mesh = grown.mesh
         union = Union.of(mesh, self._regions, tied)
-        seen = [shape.focused(number) for number in self.group]
+        seen = [shape.focused(number).with_body(wall=wall)
+                for number, wall in zip(self.group, self._walls())]
         prescribed, target = self._prescribed(seen)
         if placed is not None:
             prescribed[placed] = True
@@ -539,31 +702,12 @@ class Welding:
                 supports.append(Support(points[0], lengths / lengths.sum()))
         return supports
 
-    def _closing(self, shape: Pore, number: int) -> np.ndarray:
-        """(M,) wall that each node of an aggregate must join next, or FREE; only entire arcs join.
-
-        A film at a wall without contact stays open, because it ends the run.
-        """
-        seen = shape.focused(number)
-        outline = seen.boundary
-        keys = self.mechanics.keys
-        touched = tuple(wall for wall in seen.walls if outline.touches(wall.number).any())
-        wall = closing_nodes(outline, touched, keys.minimum_film, keys.minimum_contact_angle,
-                             self.mechanics.numerics.tolerance)
-        if outline.geometry == 2:
-            middles = wall[1::2]
-            before = np.where(middles != FREE, middles, wall[::2])
-            wall[::2] = np.where(before != FREE, before, np.roll(middles, 1))
-        return wall
-
     def _marked(self, shape: Pore) -> Pore:
-        """The pore with the nodes that have joined marked as welded."""
-        for side, (number, loop) in enumerate(zip(self.group, self._loops)):
-            seen = shape.focused(number)
-            wall = seen.body.wall
+        """The pore with the numbers of all nodes that have joined."""
+        for side, (number, loop, wall) in enumerate(zip(self.group, self._loops, self._walls())):
             for notch in self._notches:
                 if side in notch.sides:
-                    joined = np.isin(loop, notch.tied[:, notch.sides.index(side)])
+                    joined = np.isin(loop, notch.joined_nodes[:, notch.sides.index(side)])
                     wall = np.where(joined, touched(wall) + notch.weld, wall)
-            shape = seen.with_body(wall=wall)
+            shape = shape.focused(number).with_body(wall=wall)
         return with_one_point(shape.focused(None), self.group)

@@ -1,6 +1,8 @@
 """Several aggregates in one pore: against NGSolve, against one aggregate below a plane of symmetry, and one after the
 other.
 """
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from time import process_time
 from unittest import mock
@@ -10,9 +12,19 @@ import pytest
 
 from reference import gold_pair
 from repro import Meeting, load_scene, simulate, solve
-from repro.fem.walls import TOP, WELD, numbered
-from repro.model import contact, flow, substrates
+from repro.fem import welds
+from repro.fem.mesh import Mesh
+from repro.fem.outline import Outline
+from repro.fem.space import Space
+from repro.fem.walls import FREE, TOP, WELD, numbered
+from repro.march.state import RestartState, contiguous
+from repro.march.step_control import StepControl
+from repro.model import contact, flow, growing, substrates
+from repro.model.pore import Pore
+from repro.model.solid import material
+from repro.model.stages import Stages
 from repro.results.tables import Results
+from repro.scene import Scene
 from verification.evidence.cases import combined, parametrize
 from verification.evidence.checks import at_most, each_at_most
 from verification.problems.hard import clean_conductivity
@@ -360,3 +372,133 @@ def _lengths(pore) -> dict[str, float]:
     (fixed,) = np.concatenate([outline.points[outline.fixed, 0] for outline in pore.outlines])
     return {"upstream tip": fixed - one.upstream, "downstream tip": two.downstream - fixed, "thickness": one.thickness,
             "thickness of the other": two.thickness, "height of the weld": one.points[one.wall >= WELD, 1].max()}
+
+
+#: Two neighbours in a pore of 14 um. They meet within the first hour, and the larger one lands before the second one.
+NEIGHBOURS = '{radius="10 um", position="-11.1 um"}', '{radius="8 um", position="9 um"}'
+#: Hours of uniform growth: of the state that one aggregate takes over, and of the compared states. At 2.2 h the two
+#: sides of this aggregate's notch cross in `accurate`; those of two aggregates weld.
+EVENLY, LANDED = 1.0, (2.0, 2.1)
+#: Accepted where the issue's bound for welds is missed: lengths of 3.3 and 3.4 um differ by 0.27 and 0.08 % in
+#: `accurate`, and by 0.04 % in `fast` and `exact`.
+LANDED_ACCEPTED = {("accurate", "length of contact"): 5e-3}
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-weld-lands", kind="property", runs_with="fast accurate exact",
+    mutants=("weld-lands-on-a-point",), omitted="paper: the scene is refused")
+@parametrize("preset, bound", {preset: (preset, bound) for preset, bound in WELD_AIMS.items()})
+def test_landing(preset, bound, record):
+    """Two aggregates that have welded on one wall grow evenly and land on the opposite wall as one aggregate with the
+    outline of both does, whose contact lines another algorithm places. Their conductivity is the same.
+
+    Norm: largest relative differences at two times.
+    """
+    one, two = _landed(preset)
+    for name in one:
+        error = float(np.abs(np.array(two[name]) / one[name] - 1).max())
+        limit = LANDED_ACCEPTED.get((preset, name), bound)
+        origin = "the issue's bound for welds" if limit == bound else "the issue's bound for welds is missed"
+        record(at_most(name, error, limit, origin))
+
+
+def _landed(preset: str) -> list[dict[str, list[float]]]:
+    """Numbers of one aggregate, and of two."""
+    hours = [f"{hour} h" for hour in (EVENLY, *LANDED)]
+    changes = [with_preset(preset), 'kinetics.decay_coefficient="0 1/d"', 'pore.width="14 um"', 'pore.length="300 um"',
+               f'growth.end="{hours[-1]}"', f"output.times={hours}"]
+    scenes = [load_scene("base", [*changes, f"aggregate={seeds}"])
+              for seeds in (NEIGHBOURS[0], f"[{', '.join(NEIGHBOURS)}]")]
+    alone, both = [supplied_everywhere(scene) for scene in scenes]
+    start, *two = [report.pore for report in simulate(both) if report.pore.time in (EVENLY, *LANDED)]
+    assert start.welds == [(0, 1)] and not start.contact
+    state = RestartState(contiguous(_as_one(start, alone)), StepControl(0.4), row=EVENLY)
+    one = [report.pore for report in simulate(alone, state=state)]
+    return [_numbers(scenes[0], pores) for pores in (one, two)]
+
+
+def _as_one(pore: Pore, scene: Scene) -> Pore:
+    """The pore with one aggregate in place of two that are welded; its strain counts from this shape."""
+    mesh, topology = pore.mesh, pore.mesh.topology
+    outline = welds.around(pore.outlines)
+    number = {tuple(point): k for k, point in enumerate(mesh.points.tolist())}
+    loop = np.array([number[tuple(point)] for point in outline.points.tolist()])
+    space = Space(Mesh.of(mesh.points, mesh.cells, topology.biomass.astype(int), (loop,), mesh.walls, mesh.ends,
+                          topology.method))
+    region, = space.mesh.regions
+    first = pore.bodies[0]
+    solid = material(space, region, mesh.points[region.nodes], first.solid.energy)
+    body = replace(first, wall=outline.wall, fixed=outline.fixed, active=pore.active, inert=pore.inert, solid=solid)
+    return growing.with_restarted_theta(replace(pore, space=space, bodies=(body,), concentrations=None),
+                                        scene.kinetics.maximum_density)
+
+
+def _numbers(scene: Scene, pores: Sequence[Pore]) -> dict[str, list[float]]:
+    """Conductivities of aggregates on the lower wall, their areas, tips, and lengths of contact with the upper wall."""
+    solver = Stages.of(scene).solver
+    named = {"conductivity": [], "area": [], "upstream": [], "downstream": [], "length of contact": []}
+    for pore in pores:
+        outlines = pore.outlines
+        solved = solver.solve(replace(pore, concentrations=None))
+        numbers = (solved.flow.conductivity, sum(each.area for each in outlines),
+                   min(each.upstream for each in outlines), max(each.downstream for each in outlines),
+                   sum(each.contact_length(numbered(pore.mesh.walls, TOP)) for each in outlines))
+        for values, number in zip(named.values(), numbers):
+            values.append(number)
+    return named
+
+
+#: Two neighbours in a pore of 14 um with a plane of symmetry. They weld at 0.1 h and land at 0.9 h. Hours of the
+#: compared states: from 2 h on their contact lines advance.
+BELOW_PLANE, ADVANCED = ('radius="11.9 um", position="-13.3 um"', 'radius="6 um", position="7 um"'), (2.5, 3.0)
+#: Accepted where the bound is missed: lengths of 7.0 and 10.1 um differ by 0.25 and 1.08 % in `accurate`. Neither welds
+#: nor contacts become shorter. The conductivity differs by 0.038 % in `fast` and 0.009 % in `accurate`.
+MIRROR_LANDED_ACCEPTED = {("accurate", "length of contact"): 1.7e-2}
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-weld-lands-mirror", kind="property", runs_with="fast accurate", mutants=("lines-of-a-weld-rest",),
+    omitted="paper: the scene is refused; exact: see coupling-weld-lands")
+@parametrize("preset, bound", {preset: (preset, WELD_AIMS[preset]) for preset in ("fast", "accurate")})
+def test_landing_mirror(preset, bound, record):
+    """Two aggregates that have welded on one wall land on a plane of symmetry, and their contact lines advance, as the
+    two weld to their mirror image in a pore of twice the width.
+
+    Norm: largest relative differences at two times; of both pairs the larger one.
+    """
+    one, two = (_beside_plane(preset, pore) for pore in ("half", "whole"))
+    for name in one:
+        error = float(np.abs(two[name] / one[name] - 1).max())
+        limit = MIRROR_LANDED_ACCEPTED.get((preset, name), bound)
+        origin = "the issue's bound for welds" if limit == bound else "the issue's bound for welds is missed"
+        record(at_most(name, error, limit, origin))
+
+
+def _beside_plane(preset: str, pore: str) -> dict[str, np.ndarray]:
+    """(times, pairs) numbers of the lower pair, and in the whole pore of the upper one."""
+    hours = [f"{hour} h" for hour in ADVANCED]
+    changes = {"half": ['pore.width="14 um"', 'pore.upper_wall="symmetry"'], "whole": ['pore.width="28 um"']}
+    walls = ["lower", "upper"][: 1 + (pore == "whole")]
+    seeds = ", ".join(f'{{{seed}, wall="{wall}"}}' for wall in walls for seed in BELOW_PLANE)
+    scene = load_scene("base", [
+        with_preset(preset), *changes[pore], f"aggregate=[{seeds}]", f'growth.end="{hours[-1]}"',
+        f"output.times={hours}", 'pore.length="200 um"', 'flow.mean_velocity="2.9 m/day"', 'growth.time_step="3 min"'],
+        unset=["flow.head"])
+    rows = []
+    for report in simulate(scene):
+        if report.pore.time in ADVANCED:
+            outlines = report.pore.outlines
+            pairs = [outlines[k: k + 2] for k in range(0, len(outlines), 2)]
+            assert report.pore.contact and report.pore.groups == [tuple(range(len(outlines)))]
+            rows.append([[report.solved.flow.conductivity, sum(each.area for each in pair),
+                          max(each.downstream for each in pair) - min(each.upstream for each in pair),
+                          _along_plane(pair[0])] for pair in pairs])
+    return dict(zip(("conductivity", "area", "length", "length of contact"), np.moveaxis(np.array(rows), 2, 0)))
+
+
+def _along_plane(outline: Outline) -> float:
+    """Length (um) of an outline's contact with the plane y = 14 um, or of its weld there."""
+    on = (outline.wall != FREE) & (np.abs(outline.points[:, 1] - 14.0) < 0.1)
+    return float(np.ptp(outline.points[on, 0]))
