@@ -44,7 +44,6 @@ from repro.model.contact_lines import (
     Advances,
     Clearance,
     Contact,
-    free_walk,
     surface_ends,
 )
 from repro.model.mechanics import (
@@ -448,7 +447,7 @@ class Welding:
                 new = np.count_nonzero(outline.touches(wall.number)) == 1
                 for node, direction in surface_ends(outline, wall.number):
                     if outline.wall[node] == wall.number:  # no weld begins there
-                        walk = free_walk(outline, node, direction)
+                        walk = outline.free_walk(node, direction)
                         lengths = welds.lengths_from(outline, walk)
                         joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
                         yield WallLine(wall, outline, walk, direction, loop, rule, sides=(side,),
