@@ -435,12 +435,12 @@ def test_a_run_without_rows_has_the_status_of_its_folder_or_attempt(tmp_path):
 
 
 def test_a_sweep_converts_to_tables_and_pictures(tmp_path, monkeypatch):
-    """The columns are those of runs.csv, with the last row of each run. Varied keys are dimensions of a grid, and
-    coordinates of a hypercube."""
+    """The columns are those of runs.csv, with the last row of each run. Varied keys are dimensions of a grid, in the
+    order of the design, and coordinates of a hypercube."""
     pandas, xarray = map(pytest.importorskip, ("pandas", "xarray"))
     monkeypatch.setattr(driver, "ready", in_this_process)
     changes = ["growth.end=0.4 h", "numerics.refinement=0.3"]
-    varied = ["pore.width=48 um, 50 um", "flow.viscosity_ratio=100, 2000"]
+    varied = ["pore.width=50 um, 48 um", "flow.viscosity_ratio=100, 2000"]
     swept = repro.sweep("base", varied, tmp_path, changes)
     frame, array = swept.to_pandas(), swept.to_xarray()
     written = pandas.read_csv(tmp_path / "runs.csv", index_col="run")
@@ -451,6 +451,7 @@ def test_a_sweep_converts_to_tables_and_pictures(tmp_path, monkeypatch):
             name: value for name, value in last.items() if name != "time_h"}
         at = array.sel({"pore.width": run.point.values[0], "flow.viscosity_ratio": run.point.values[1]})
         assert float(at["conductivity_m_per_d"]) == last["conductivity_m_per_d"] and at["end_h"] == 0.4
+    assert array["pore.width"].values.tolist() == [50.0, 48.0]
     assert array.sizes == {"pore.width": 2, "flow.viscosity_ratio": 2} and array["pore.width"].attrs["units"] == "um"
     assert isinstance(array, xarray.Dataset) and array["conductivity_m_per_d"].attrs["units"] == "m/day"
     for run in (swept.runs[3], swept.runs[1]):
@@ -458,7 +459,7 @@ def test_a_sweep_converts_to_tables_and_pictures(tmp_path, monkeypatch):
     assert swept.to_xarray().sizes == {"pore.width": 2, "flow.viscosity_ratio": 1}
     swept.runs.extend(5 * swept.runs)
     assert swept.to_xarray().sizes == {"run": 12} and repr(swept.runs).splitlines()[9:] == ["... and 3 more"]
-    assert repr(swept.runs).startswith("<run 1 (48.0, 100.0): completed, to 0.4 h>")
+    assert repr(swept.runs).startswith("<run 1 (50.0, 100.0): completed, to 0.4 h>")
     axes = swept.plot("conductivity")
     assert [line.get_label() for line in axes.lines] == ["flow.viscosity_ratio = 100"]
     assert axes.get_xlabel() == "pore.width (um)" and "m/day" in axes.get_ylabel()

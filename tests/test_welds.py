@@ -135,7 +135,7 @@ def test_corners_beyond_a_weld_leave_in_pairs():
         one, two = (welds.lengths_from(outline, walk) for outline, walk in zip(outlines, walks))
         count = welds.opposite_corners(one, two)
         assert one[count - 1] > 3.0
-        assert np.diff(one[:count])[:-1].min() > 0.3 * sizes.moving_lines
+        assert np.diff(one[:count])[:-1].min() > 0.3 * sizes.contact
 
 
 def test_outlines_without_a_weld_stay_as_they_are():
@@ -334,7 +334,8 @@ def until_meeting(*changes):
     return reports, str(end.value)
 
 
-WALLS = pytest.mark.parametrize("wall", ["lower", "upper"])
+OPPOSITE = {"lower": "upper", "upper": "lower"}
+WALLS = pytest.mark.parametrize("wall", OPPOSITE)
 
 
 @pytest.mark.parametrize("bumps, wall, place", [(BUMPS, "lower", 3.3), (BUMPS, "upper", 3.3), (DEEP, "lower", 9.9)],
@@ -342,7 +343,7 @@ WALLS = pytest.mark.parametrize("wall", ["lower", "upper"])
 def test_welded_aggregates_that_touch_in_a_second_place_end_the_run(bumps, wall, place):
     """The valley between both contacts stays open until then. Without this end, the weld jumps across the shallow
     valley when the film is 1.9 um thick: its length rises from 3.6 to 11 um."""
-    seeds = drawn(bumps, wall, WIDTH, "two"), drawn(FLAT, {"lower": "upper", "upper": "lower"}[wall], WIDTH, "flat")
+    seeds = drawn(bumps, wall, WIDTH, "two"), drawn(FLAT, OPPOSITE[wall], WIDTH, "flat")
     reports, message = until_meeting('growth.end="0.7 h"', f'pore.width="{WIDTH} um"',
                                      f"aggregate=[{', '.join(seeds)}]")
     assert re.match(r"aggregates two and flat touch in a second place at t = 0.[35]\d+ h: near x = \d.\d+, "
@@ -567,7 +568,7 @@ def test_two_aggregates_on_one_wall_become_one_that_only_scales(seeds):
 
 
 @WALLS
-def test_the_node_of_a_weld_at_a_wall_stays_on_this_wall(wall, other):
+def test_the_node_of_a_weld_at_a_wall_stays_on_this_wall(wall):
     """It has the number of both."""
     pore = at_start(*(BESIDE if wall == "lower" else BESIDE_UP))
     scene = scene_of(*SCENE)
@@ -665,7 +666,7 @@ def numbers_of(report, wall):
 
 @ORDERS
 @WALLS
-def test_welded_aggregates_land_on_the_opposite_wall(seeds, end, wall, other):
+def test_welded_aggregates_land_on_the_opposite_wall(seeds, end, wall):
     """The larger one alone touches it. In the exchanged order they do the same, on either wall. The bound is the
     tolerance of the preset; a length of contact of 4 um may differ by its accuracy in both, 1 %."""
     first, last = landed(on_wall(seeds, wall), end)[-2:]
@@ -675,6 +676,7 @@ def test_welded_aggregates_land_on_the_opposite_wall(seeds, end, wall, other):
     low, beside = last.pore.bodies
     number = {"lower": 2, "upper": 1}[wall]
     assert number in low.wall and number not in beside.wall
+    other = OPPOSITE[wall]
     *_, exchanged = landed(on_wall(seeds, other)[::-1], end)
     *numbers, length = numbers_of(last, wall)
     *others, other_length = numbers_of(exchanged, other)
@@ -729,7 +731,7 @@ def test_a_group_lands_on_a_plane_of_symmetry_as_it_welds_to_its_mirror_image():
 
 
 @WALLS
-def test_a_second_one_of_a_group_at_the_opposite_wall_encloses_water(wall, other):
+def test_a_second_one_of_a_group_at_the_opposite_wall_encloses_water(wall):
     """Both neighbours are equally large, so the second one touches it as the first one has landed."""
     seeds = on_wall(['{name="low", radius="11.7 um", position="-12.8 um"}',
                      '{name="beside", radius="11.6 um", position="12.7 um"}'], wall)
@@ -742,7 +744,7 @@ def test_a_second_one_of_a_group_at_the_opposite_wall_encloses_water(wall, other
 
 @WALLS
 @pytest.mark.parametrize("reach", [2.0, 0.5])
-def test_the_place_of_a_landing_leaves_the_curve_as_it_is(wall, other, reach):
+def test_the_place_of_a_landing_leaves_the_curve_as_it_is(wall, reach):
     """With corners at the point nearest to the other wall, and beside it."""
     walls = channel_walls(WIDTH) if wall == "lower" else channel_walls(WIDTH)[::-1]
     before = half_disc(13.0, 7, 2, 0.4, walls[0])

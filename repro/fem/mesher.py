@@ -55,7 +55,7 @@ def generate_around(outlines: Sequence[Outline], ends: tuple[float, float], sizi
     crosses itself, another outline, a wall or an end of the channel, or if a curved triangle is
     turned over.
     """
-    sizing = sizes_of.in_contact(outlines, sizing)
+    sizing = sizes_of.with_contact_gradation(outlines, sizing)
     outlines = welds.coarsened(outlines, sizing)
     for _ in range(HALVINGS):
         outlines = [sizes_of.split(outline, beside)

@@ -148,7 +148,7 @@ def _on_opposite(outline: Outline) -> np.ndarray:
     return (wall != FREE) & (wall != outline.seat.wall)
 
 
-def in_contact(outlines: Sequence[Outline], sizing: Sizing) -> Sizing:
+def with_contact_gradation(outlines: Sequence[Outline], sizing: Sizing) -> Sizing:
     """The sizes of a mesh around outlines, with the gradation of a mesh in contact if one of them
     touches the opposite wall."""
     if sizing.contact == inf or not any(_on_opposite(outline).any() for outline in outlines):

@@ -23,8 +23,8 @@ walls cannot hold the aggregate, or if erosion removes a contact surface: the mo
 surface that becomes free.
 
 With growth.meeting = "weld", two aggregates that meet join (:mod:`repro.model.welding`), and the
-run continues. So it does when a welded aggregate joins a wall that no aggregate of its group
-touches. If a weld or such a contact would enclose water, or if :attr:`repro.Scene.without_weld`
+run continues. The run also continues if a welded aggregate touches a wall that its group does not
+touch yet. If a weld or such a contact would enclose water, or if :attr:`repro.Scene.without_weld`
 gives a reason, the run ends, and its message says why.
 
 With growth.until = "steady", a run also ends after a step in which the aggregates hardly change

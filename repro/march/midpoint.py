@@ -186,8 +186,9 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
                   search: SearchOptions) -> Halfway:
     """Solve in the shape half way through a step of ``duration`` (h).
 
-    The rates at the start give this shape. Welds end at corners here, because this shape gives only
-    the rates of the step. If the moved mesh is not acceptable, a new mesh replaces it. The masses
+    The rates at the start give this shape. Welds and their contact lines end at corners here,
+    because this shape gives only the rates of the step. If the moved mesh is not acceptable, a new
+    mesh replaces it. The masses
     are then carried to the points of the new mesh, and the rates back to the points of the mesh at
     the start.
     """

@@ -76,7 +76,9 @@ def _advance(stages: Stages, previous: Pore, solved: Solved,
             step, after = _cut(stages, previous, solved, stages.growth.end)
             control = planned
         except (StageError, FloatingPointError):
-            step, after, control = _find_step(stages, previous, solved, planned, stages.growth.end)
+            half = (stages.growth.end - previous.time) / 2
+            step, after, control = _find_step(stages, previous, solved,
+                                              replace(planned, length=half), stages.growth.end)
     return replace(step, within=within), after, control
 
 

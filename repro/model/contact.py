@@ -83,10 +83,10 @@ def expand(mechanics: Mechanics, grown: Pore, theta: Sequence[np.ndarray],
     With fluid forces, shape and flow are computed in turn until both agree. If the forces change,
     the flow around the new shape changes them again, by up to 0.6 of the first change after
     contact. Anderson acceleration therefore chooses the forces of each round. Contact lines and
-    nodes on walls move until they rest. Then they stay, because each search moves a line by its
-    tolerance. The film at the first
-    contact is tested under the forces of the open pore, because the forces are larger in a closed
-    pore.
+    nodes on walls move until they rest. Afterwards those of a single aggregate are fixed: a new
+    search could move a line by up to its tolerance, and the rounds would not converge. The film at
+    the first contact is tested under the forces of the open pore, because the forces are larger in
+    a closed pore.
 
     If ``search.line_size`` is finite, triangles are bisected where ``search.advances`` predicts the
     contact lines with the opposite wall. If there is no equilibrium on the bisected triangles, the

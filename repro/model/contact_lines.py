@@ -81,7 +81,7 @@ class SearchOptions:
     start?; patient: is a failed equilibrium tried again in smaller parts?; advances: {(index of the
     aggregate, wall, direction): um along its outline}, first trial of each line; line_size: um,
     size of the triangles beside the lines with the opposite wall, infinite to keep the mesh;
-    within_arcs: do welds end within arcs?
+    within_arcs: do welds and their contact lines end within arcs?
     """
 
     landing: float = 0.0

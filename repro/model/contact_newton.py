@@ -53,8 +53,9 @@ DEPARTURE = 0.3
 #: A line leaves or crosses a corner only if the defect of the shape is smaller than this.
 NEAR = 0.05
 #: Trial lengths of a step, until no triangle is turned over and the defect rises by at most RISE.
-#: The shortest one needs only the first. With this limit 0 and 2 instead of 3 and 9 solutions fail
-#: in ``wide`` to 45 h (``fast``, ``accurate``), with 2 or 10 as limit 2 and 4 or 5.
+#: If it always rises by more, the last length without a triangle turned over is used. In ``wide``
+#: to 45 h, 0 (``fast``) and 2 (``accurate``) solutions fail. Without RISE 3 and 9 fail, with 2 or
+#: 10 as RISE 2 and 4 to 5.
 LENGTHS = 1.0, 0.5, 0.25, 0.125, 0.0625
 RISE = 4.0
 
@@ -208,6 +209,7 @@ class Coupled:
         change = factors.solve(-iterate.residual, carried)
         steps, change = self._with_lines(iterate, factors, change)
         start = [line.advance for line in self._lines]
+        trial = None
         for length in LENGTHS:
             for line, before, step in zip(self._lines, start, steps):
                 line.advance = _place(line, before, length * step) if step else before
@@ -216,16 +218,19 @@ class Coupled:
             placed = self._place() if steps.any() else self.placed
             if not placed.same_arcs(self.placed):
                 position, pressure = placed.divided(*self.placed.on_parent(position, pressure))
-            if placed.system.strained(position).J.min() <= 0:
-                continue
-            after = placed.iterate(position, pressure)
-            if after.defect <= RISE * iterate.defect or length == LENGTHS[-1]:
-                self._factors = factors if placed is self.placed else None
-                self.placed = placed
-                self.position = position
-                self.pressure = pressure
-                return bool(steps.any()), after
-        raise GrowthError("no step of contact lines keeps det F > 0")
+            if placed.system.strained(position).J.min() > 0:
+                after = placed.iterate(position, pressure)
+                trial = placed, position, pressure, [line.advance for line in self._lines]
+                if after.defect <= RISE * iterate.defect:
+                    break
+        if trial is None:
+            raise GrowthError("no step of contact lines keeps det F > 0")
+        placed, self.position, self.pressure, advances = trial
+        for line, advance in zip(self._lines, advances):
+            line.advance = advance
+        self._factors = factors if placed is self.placed else None
+        self.placed = placed
+        return bool(steps.any()), after
 
     def _with_lines(self, iterate: growth.Iterate, factors: Factored,
                     change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -99,9 +99,9 @@ class Solver:
             return Solved(carried, None, None)
         supplied = at_time(self.substrates, pore.time)
         if carried and not self.transport.stores:
-            number = peclet(supplied, self.channel.width, carried.mean_velocity)
-            if number < SLOWEST:
-                raise TransportError(f"the Peclet number u W / D is {number:.2g}, under "
+            peclet_number = peclet(supplied, self.channel.width, carried.mean_velocity)
+            if peclet_number < SLOWEST:
+                raise TransportError(f"the Peclet number u W / D is {peclet_number:.2g}, under "
                                      f"{SLOWEST:g}: nothing is supplied through the inlet; leave "
                                      "[flow] out for pure diffusion")
         from repro.model import substrates  # a scene without [substrates] does not load them

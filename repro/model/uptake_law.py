@@ -174,7 +174,7 @@ class UptakeLaw:
         Returns
         -------
         bool
-            True if a small change of C hardly changes m: above K, if the subclass does not differ.
+            True if a small change of C hardly changes m. By default: if C exceeds K.
 
         Examples
         --------

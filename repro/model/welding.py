@@ -57,9 +57,9 @@ from repro.model.remeshing import Remeshing
 from repro.model.solid import Shape, Solid
 from repro.model.support import Support, lengths_along
 
-#: The last arc of a weld is halved until a part is shorter than this times numerics.tolerance of
-#: the arc: a sixteenth in ``fast``. Lengths then err by 0.8 % or less, and by up to 1.4 % with an
-#: eighth (``coupling-weld``).
+#: The last arc of a weld or a contact is halved until a part is shorter than this times
+#: numerics.tolerance of the arc: a sixteenth in ``fast``. Lengths then err by 0.8 % or less, and by
+#: up to 1.4 % with an eighth (``coupling-weld``).
 ARC_PART = 10.0
 
 
@@ -103,8 +103,9 @@ def _with_first_length(mechanics: Mechanics, rules: Remeshing, pore: Pore, speed
                        number: int, begin: Callable[[float], Pore]) -> Pore:
     """The pore with a new weld or a new contact of the aggregate with the index ``number``.
 
-    begin: begin(length) is the pore on a mesh with the first node of it, and with corners at a
-    length (um) on each side of this node. Other arguments are those of :func:`join`.
+    begin: begin(length) returns the pore on a new mesh. The mesh has the first node of the weld or
+    the contact, and a corner at this length (um) on each side of the node. Other arguments are
+    those of :func:`join`.
     """
     for length in mechanics.keys.minimum_film * FIRST_LENGTHS:
         try:
@@ -187,7 +188,7 @@ class Front(ABC):
     step: float = 1.0
     sides: tuple[int, ...]
     size: int
-    meets: ClassVar[str]
+    no_more_corners: ClassVar[str]
 
     def __post_init__(self) -> None:
         self.last_too_few = self.joined - 1
@@ -210,9 +211,9 @@ class Front(ABC):
     def advance(self, points: np.ndarray) -> None:
         """Go to the next trial; points: (N, 2) um, of the mesh in the present trial.
 
-        While a film is too thin, all corners up to it join. Then fewer corners join, until the
-        smallest number without a thin film is known. Raises GrowthError if there are no further
-        corners.
+        While a film is too thin, the corners up to it join, in the first trial all but one. Then
+        fewer corners join, until the smallest number without a thin film is known. Raises
+        GrowthError if there are no further corners.
         """
         if not self.too_thin(points, self.joined):
             self.first_enough = self.joined
@@ -231,7 +232,7 @@ class Front(ABC):
     def join_next(self) -> None:
         """Join one more corner. Raises GrowthError if there is none."""
         if self.joined == self._last:
-            raise GrowthError(self.meets)
+            raise GrowthError(self.no_more_corners)
         self.joined += 1
 
     def predict(self, points: np.ndarray) -> None:
@@ -266,7 +267,8 @@ class Notch(Front):
     before: np.ndarray
     film: float
     slope: float
-    meets: ClassVar[str] = "the weld advances beyond the nodes that are opposite each other"
+    no_more_corners: ClassVar[str] = ("the weld advances beyond the nodes that are opposite each "
+                                      "other")
 
     @property
     def nodes(self) -> np.ndarray:
@@ -306,7 +308,7 @@ class WallLine(Front):
     direction: int
     loop: np.ndarray
     rule: Clearance
-    meets: ClassVar[str] = MEET
+    no_more_corners: ClassVar[str] = MEET
 
     @property
     def nodes(self) -> np.ndarray:
@@ -494,7 +496,7 @@ class Welding:
                 front.advance(shape.mesh.points)
             if joins == tuple(front.joined for front in self._fronts):
                 return self._within_arcs(shape)
-        raise GrowthError(f"the weld still grows after {CONTACT_ROUNDS} rounds")
+        raise GrowthError(f"the weld or its contact lines still move after {CONTACT_ROUNDS} rounds")
 
     def _within_arcs(self, shape: Pore) -> Expansion:
         """The shape with each end of a weld and each contact line within the last arcs that joined.

@@ -41,7 +41,7 @@ LAG = 0.05
 #: Largest relative error by one simplification, roughly: the strain of the aggregate by neglected
 #: forces; the flow through the narrowest film, and the uptake of a layer, by elements that widen a
 #: layer of the flow or a front.
-ERROR = 0.01
+ACCEPTED = 0.01
 #: Drag on a half-cylinder on a wall in shear flow, over the wall's shear and the radius: 6.73 in
 #: reference/half_cylinder.py, for a radius much smaller than the pore's width.
 DRAG = 6.73
@@ -156,12 +156,12 @@ def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
 def _forces(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     stress = computed["fluid stress over modulus"]
     strain = max(stress.start, stress.end or 0.0)
-    if not scene.growth.has_fluid_forces and strain > ERROR:
+    if not scene.growth.has_fluid_forces and strain > ACCEPTED:
         stressed = scene.growth.new_biomass == "stressed"
         setting = '"included"' + ("" if stressed else ' with growth.new_biomass = "stressed"')
         yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
-                     f"above {ERROR:g}: it strains the aggregate by about this fraction, and the "
-                     f"scene neglects it (2.3.3); {setting} models it")
+                     f"above {ACCEPTED:g}: it strains the aggregate by about this fraction, and "
+                     f"the scene neglects it (2.3.3); {setting} models it")
 
 
 def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
@@ -180,9 +180,9 @@ def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
         return
     stress = computed["fluid stress over modulus"]
     force = DRAG * stress.start + (stress.end or 0.0)
-    if force > ERROR:
+    if force > ACCEPTED:
         yield Caveat("growth.wall", f"the water's force reaches {force:.2g} of mu_L times the "
-                     f"aggregate's thickness, above {ERROR:g}: a sliding aggregate is kept in "
+                     f"aggregate's thickness, above {ACCEPTED:g}: a sliding aggregate is kept in "
                      "place by a traction of an assumed distribution, and its shape depends "
                      'on it by about this fraction; growth.wall = "bonded" computes the traction')
 
@@ -197,11 +197,11 @@ def _fronts(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     for uptake in numbers.uptakes(scene):
         layer, depth = uptake.layer, uptake.depth
         lost = (front / depth) ** 2 if uptake.law.sharp and depth else 0.0
-        if lost > ERROR:
+        if lost > ACCEPTED:
             yield Caveat("numerics.refinement", f"elements widen the front behind which there is "
                          f"no {uptake.name} to {front:.2g} um, of {depth:.2g} um that the supply "
                          f"reaches: uptake may be {100 * lost:.2g} % too small"
-                         + _resolving(resolution(scene) * (lost / ERROR) ** 0.5))
+                         + _resolving(resolution(scene) * (lost / ACCEPTED) ** 0.5))
         elif not uptake.law.sharp and layer < min(nodes, thickness):
             zero_order = uptake.law.saturates(uptake.substrate.supply)
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
@@ -229,8 +229,8 @@ def _drag_layer(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Cavea
     thickness = size / ACROSS
     gap = max(scene.pore.width - sizes.thickness, least_gap(scene))
     loss = 3 * (root - permeability / thickness) / gap
-    if loss > ERROR:
-        accepted = root / (1 - ERROR * gap / (3 * root))
+    if loss > ACCEPTED:
+        accepted = root / (1 - ACCEPTED * gap / (3 * root))
         yield Caveat("flow.permeability", f"the flow fades in the aggregate over the root of "
                      f"the permeability, {root:.2g} um, which elements of {size:.2g} um widen to "
                      f"{thickness:.2g} um: the flow through the narrowest film, {gap:.2g} um, may "

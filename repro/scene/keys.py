@@ -454,8 +454,8 @@ class Numerics:
         1.0, up_to(20), source="3.1 [E13]", about="Divides the element sizes")
     gradation: float = number(
         0.25, from_0_to(1), source="3.1 [E13]",
-        about="Growth of element sizes with distance from an aggregate, doubled in contact; "
-              "0: one size everywhere")
+        about="Growth of element sizes with distance from an aggregate, twice as fast in contact "
+              "with contact_elements; 0: one size everywhere")
     contact_elements: float = number(
         0.0, from_0_to(100),
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall, "

@@ -101,7 +101,11 @@ class Swept:
         frame = self.to_pandas().drop(columns="folder")
         frame = frame.rename(columns=dict(zip((each.column for each in self.factors), keys)))
         is_grid = len(frame) == prod(frame[keys].nunique()) and not frame.duplicated(keys).any()
-        dataset = from_dataframe(frame.set_index(keys) if is_grid else frame).set_coords(keys)
+        if is_grid:
+            in_order = {key: frame[key].unique() for key in keys}  # pandas sorts the index
+            dataset = from_dataframe(frame.set_index(keys)).reindex(in_order)
+        else:
+            dataset = from_dataframe(frame).set_coords(keys)
         for name, variable in dataset.variables.items():
             variable.attrs["units"] = units.get(name, unit_of(name).symbol)
         return dataset.assign_attrs(scene=self.source)
