@@ -81,7 +81,8 @@ def test_states_are_immutable():
     names = [module.name for module in pkgutil.walk_packages(repro.__path__, "repro.") if "__main__" not in module.name]
     every = {each for name in names for each in vars(importlib.import_module(name)).values()
              if "__dataclass_params__" in getattr(each, "__dict__", ()) and each.__module__.startswith("repro.")}
-    searches = {"Line", "History", "_Rounds", "Closing", "ByNodes", "ByLines", "Notch", "Welding"}
+    searches = {"Line", "History", "_Rounds", "Closing", "ByNodes", "ByLines", "Front", "Notch", "WallLine",
+                "Welding"}
     assert {each.__name__ for each in every if not each.__dataclass_params__.frozen} <= searches
     assert len(every) > 50
     compared = [part for each in every if each.__dataclass_params__.eq for part in dataclasses.fields(each)]

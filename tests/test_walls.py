@@ -163,7 +163,7 @@ def test_a_wedge_closes_at_a_plane_of_symmetry_at_half_of_the_tangent(upper, par
 @pytest.mark.parametrize("number", [1, 2])
 def test_a_plane_of_symmetry_bears_nothing_as_a_wall(number):
     """The traction that walls must bear is that of the other wall, on either side."""
-    mechanics, seed = grown_plug(2, 1.2)
+    mechanics, seed = grown_plug(2, 1.02)
     shape = contact.expand(mechanics, seed, [seed.body.theta]).pore
     scene = load_scene("base", ["numerics.preset=fast"])
     peak = adhesion.wall_peak(adhesion.Loading.of(scene), with_wall(shape, number, mirrors=True), None)

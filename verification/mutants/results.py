@@ -2851,8 +2851,8 @@ MUTANTS = (
         ("fastest-without-the-mirror-image",
          "The largest velocity under a head is that of a pore of the same width.",
          "fastest",
-         "width = whole_width(channel_walls(channel.width, upper=channel.upper_wall))",
-         "width = channel.width",
+         "poiseuille_loss(channel.length, channel.whole_width)",
+         "poiseuille_loss(channel.length, channel.width)",
          f"{WALLS}expected_numbers_are_those_of_the_pore_with_its_mirror_image[symmetry]")),
     *changes(
         "repro/preflight/refined.py",
