@@ -335,11 +335,14 @@ def until_meeting(*changes):
 
 
 OPPOSITE = {"lower": "upper", "upper": "lower"}
-WALLS = pytest.mark.parametrize("wall", OPPOSITE)
+#: One wall in `make test`, and both in `make test-thorough`.
+WALLS = pytest.mark.parametrize("wall", ["lower", pytest.param("upper", marks=pytest.mark.thorough)])
 
 
-@pytest.mark.parametrize("bumps, wall, place", [(BUMPS, "lower", 3.3), (BUMPS, "upper", 3.3), (DEEP, "lower", 9.9)],
-                         ids=["lower", "upper", "deep"])
+@pytest.mark.parametrize("bumps, wall, place", [
+    (BUMPS, "lower", 3.3), *(pytest.param(*each, marks=pytest.mark.thorough)
+                             for each in ((BUMPS, "upper", 3.3), (DEEP, "lower", 9.9)))],
+    ids=["lower", "upper", "deep"])
 def test_welded_aggregates_that_touch_in_a_second_place_end_the_run(bumps, wall, place):
     """The valley between both contacts stays open until then. Without this end, the weld jumps across the shallow
     valley when the film is 1.9 um thick: its length rises from 3.6 to 11 um."""
@@ -357,9 +360,10 @@ def test_welded_aggregates_that_touch_in_a_second_place_end_the_run(bumps, wall,
     assert pore.outlines[0].distances(outline.points[between]).max() > 3.0, "the valley is open"
 
 
-@WALLS
-@pytest.mark.parametrize("preset", ["fast", "paper"])
-def test_a_surface_that_touches_itself_ends_the_run(wall, preset):
+@pytest.mark.parametrize("preset, wall", [
+    ("fast", "lower"), ("paper", "upper"),
+    *(pytest.param(*each, marks=pytest.mark.thorough) for each in (("fast", "upper"), ("paper", "lower")))])
+def test_a_surface_that_touches_itself_ends_the_run(preset, wall):
     """With straight triangles too. The lobes enclose water there."""
     seed = drawn(LOBES, wall, 60.0, "lobes")
     reports, message = until_meeting('growth.end="2 h"', "growth.wall=bonded", f"numerics.preset={preset}",
@@ -378,9 +382,11 @@ HOOK = [(-14, 0), (-13, 12), (-8, 19.4), (0, 20), (13, 20), (19, 19.4), (22, 12)
 
 
 @pytest.mark.parametrize("points, place, touches, preset, wall, side", [
-    (HEADS, 12.0, 22.2, "fast", "lower", 1), (HEADS, 12.0, 22.2, "fast", "upper", -1),
+    (HEADS, 12.0, 22.2, "fast", "lower", 1),
+    pytest.param(HEADS, 12.0, 22.2, "fast", "upper", -1, marks=pytest.mark.thorough),
     (HEADS, 12.0, 22.2, "paper", "upper", 1), (HEADS, 12.0, 22.2, "paper", "lower", -1),
-    (HOOK, 16.5, 0.0, "fast", "upper", -1), (HOOK, 16.5, 0.0, "paper", "lower", 1)],
+    pytest.param(HOOK, 16.5, 0.0, "fast", "upper", -1, marks=pytest.mark.thorough),
+    (HOOK, 16.5, 0.0, "paper", "lower", 1)],
     ids=["heads-fast-lower", "heads-fast-upper-mirrored", "heads-paper-upper", "heads-paper-lower-mirrored",
          "hook-fast-upper-mirrored", "hook-paper-lower"])
 def test_an_aggregate_that_touches_a_wall_in_a_second_place_ends_the_run(points, place, touches, preset, wall, side):
@@ -707,6 +713,7 @@ def test_a_group_lands_under_the_forces_of_the_water():
     assert length == pytest.approx(other_length, rel=2e-2)
 
 
+@pytest.mark.thorough
 def test_a_group_lands_on_a_plane_of_symmetry_as_it_welds_to_its_mirror_image():
     """Two pairs in the whole pore become one group of four. The bounds are those of the issue for `fast`, 1 %; tips
     differ by 0.1 % of the larger one's length, 25 um."""
@@ -822,6 +829,7 @@ def test_a_front_at_rest_joins_a_corner_if_its_film_is_too_thin_when_another_one
     assert closing._notches[0].joined == 1 and trials[0] == [2] and trials[-1] == [0, 2]
 
 
+@pytest.mark.thorough
 def test_new_arcs_in_an_acute_notch_do_not_cross():
     """The notch beside the landed aggregate is almost closed at 2.5 h. Arcs that replaced its smallest ones crossed at
     the line, so that no mesh could be made."""
