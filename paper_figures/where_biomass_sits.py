@@ -63,8 +63,12 @@ def _seeds(axes: Axes) -> None:
         for x, wall in places:
             start, centre = (0, low) if wall == "lower" else (180, low + WIDTH)
             axes.add_patch(Wedge((x, centre), radius, start, start + 180, facecolor=colour, zorder=2))
-    axes.set(xlim=(-LENGTH / 2, LENGTH / 2), aspect="equal", xlabel=style.X_LABEL, yticks=[],
+    axes.set(xlim=(-LENGTH / 2, LENGTH / 2), aspect="equal", xlabel=style.X_LABEL,
+             yticks=[(0.5 - 1.5 * row) * WIDTH for row in range(len(ARRANGEMENTS))], yticklabels=list(ARRANGEMENTS),
              title="seeds of the same total area")
+    axes.tick_params(axis="y", length=0)
+    for label, colour in zip(axes.get_yticklabels(), COLOURS):
+        label.set_color(colour)
 
 
 def _curves(axes: Axes, folders: tuple[Path, ...]) -> None:
@@ -73,13 +77,12 @@ def _curves(axes: Axes, folders: tuple[Path, ...]) -> None:
         area, lost = _course(folder)
         colour = COLOURS[list(ARRANGEMENTS).index(name)]
         if drive == "head":
-            axes.plot(area, 1 - lost, color=colour, label=name)
+            axes.plot(area, 1 - lost, color=colour)
         else:
             axes.plot(area, 1 - lost, "--", color=colour)
     axes.axvline(COMPARED, color=style.FAINT, linewidth=0.8, linestyle=":")
     axes.set(yscale="log", xlim=(0, 2.0), ylim=(5e-3, 1.1), xlabel=r"area of all aggregates, $A / W^2$",
              ylabel=r"conductivity, $K / K_0$", title="full: constant head; dashed: constant velocity")
-    axes.legend(loc="lower left")
     style.grid(axes)
 
 

