@@ -289,8 +289,7 @@ SHORT, WELDED = 60.0, (0.5, 1.5, 2.8)
     mutants=("weld-slips", "weld-ends-at-corners"))
 @parametrize("preset, bound", {preset: (preset, bound) for preset, bound in WELD_AIMS.items()})
 def test_weld(preset, bound, record):
-    """Two equal aggregates on opposite walls that weld grow and clog their pore as one does that touches a plane of
-    symmetry: the weld is the contact surface with the plane.
+    """Two equal aggregates that weld grow and clog their pore as one does that touches a plane of symmetry.
 
     Norm: largest relative difference of columns and of the weld's length, at three times.
     """
