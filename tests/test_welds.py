@@ -13,7 +13,7 @@ import repro
 from reference import surface_stretch
 from repro.errors import GrowthError, MeshError
 from repro.fem import welds
-from repro.fem.outline import half_disc, polygon
+from repro.fem.outline import half_disc, parabola, polygon
 from repro.fem.sizing import GRADATION
 from repro.fem.walls import WELD, channel_walls, on_any
 from repro.march.ends import Ends, _meetings, _reason_against_weld, nearest_end
@@ -126,6 +126,25 @@ def test_a_new_mesh_merges_small_edges_of_a_weld_and_keeps_areas_and_common_poin
     # SPLIT times the size beside the line; no edge is longer than its distance from the line allows.
     from_line = np.minimum(np.cumsum(edges), np.cumsum(edges[::-1])[::-1])
     assert (edges <= 1.4 * (sizes.contact + 0.25 * from_line) + 1e-9).all()
+
+
+def test_small_arcs_stay_in_an_acute_notch_if_longer_ones_would_cross():
+    """One surface opens by a hundredth of its old distance at the line, and by all of it 2 um beyond. Arcs of 0.06 um
+    follow this. Arcs of 0.9 um would cross at the line, also with three hundredths."""
+    sizes, (one, two) = sizes_and_outlines()
+    points = two.points.copy()
+    for walks in welds.notches(one, two):
+        along, nodes = (walk[: min(map(len, walks))] for walk in walks)
+        s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(one.points[along], axis=0), axis=1)))
+        opening = np.minimum(0.01 + 0.99 * (s / 2.0) ** 2, 1.0)
+        points[nodes] = one.points[along] + opening[:, None] * (two.points[nodes] - one.points[along])
+    acute = [one, replace(two, points=points)]
+    for outlines in (acute, welds.coarsened(acute, sizes)):
+        for walks in welds.notches(*outlines):
+            lower, upper = (parabola(np.linspace(0.02, 1.0, 50)) @ (outline.points[walk[:3]] - outline.points[walk[0]])
+                            for outline, walk in zip(outlines, walks))
+            sides = np.sign(lower[:, 0] * upper[:, 1] - lower[:, 1] * upper[:, 0])
+            assert np.all(sides == sides[-1]) and sides[-1] != 0
 
 
 def test_corners_beyond_a_weld_leave_in_pairs():

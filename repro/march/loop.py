@@ -1,9 +1,9 @@
 """The loop of steps of every scheme.
 
-Steps depend neither on the requested rows nor on the end of the run, to the last bit, unless the
-step to this end fails and shorter steps lead to it. A row between
-the ends of two steps is interpolated within a step, and no step starts from it. If a row cannot be
-computed, the state contains the reason, and the run continues. If ``growth.end`` or an end of the
+Steps depend on neither the requested rows nor the end of the run, to the last bit. There is one
+exception: if the step to the end fails, shorter steps lead to it. A row between the ends of two
+steps is interpolated within a step, and no step starts from it. If a row cannot be computed, the
+state contains the reason, and the run continues. If ``growth.end`` or an end of the
 model (:mod:`repro.march.ends`) lies within a step, the step is cut there. Rows before the end are
 still interpolated in the uncut step. The ledger of the cut step balances like the others. A run to
 a later end restarts from the state before the cut step.

@@ -188,9 +188,8 @@ def solve_halfway(stages: Stages, previous: Pore, solved: Solved, first: Rates, 
 
     The rates at the start give this shape. Welds and their contact lines end at corners here,
     because this shape gives only the rates of the step. If the moved mesh is not acceptable, a new
-    mesh replaces it. The masses
-    are then carried to the points of the new mesh, and the rates back to the points of the mesh at
-    the start.
+    mesh replaces it. The masses are then carried to the points of the new mesh, and the rates back
+    to the points of the mesh at the start.
     """
     ahead = replace(grow(previous, first, duration / 2), time=previous.time + duration / 2)
     search = replace(search, advances=_last_advances(previous, 1, duration / 2), within_arcs=False)

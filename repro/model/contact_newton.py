@@ -54,8 +54,8 @@ DEPARTURE = 0.3
 NEAR = 0.05
 #: Trial lengths of a step, until no triangle is turned over and the defect rises by at most RISE.
 #: If it always rises by more, the last length without a triangle turned over is used. In ``wide``
-#: to 45 h, 0 (``fast``) and 2 (``accurate``) solutions fail. Without RISE 3 and 9 fail, with 2 or
-#: 10 as RISE 2 and 4 to 5.
+#: to 45 h, 0 solutions fail in ``fast`` and 2 in ``accurate``. Without this limit 3 and 9 fail.
+#: With a limit of 2, 2 and 4 fail; with a limit of 10, 2 and 5.
 LENGTHS = 1.0, 0.5, 0.25, 0.125, 0.0625
 RISE = 4.0
 

@@ -430,8 +430,7 @@ class Welding:
         weld = welds.common(*outlines)
         new = np.count_nonzero(outlines[0].welded(weld)) == 1
         walks = welds.in_notch(outlines, walks, keys.minimum_film)
-        lengths = welds.lengths_from(outlines[0], walks[0])
-        joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
+        joined = self._within_reach(outlines[0], walks[0]) if new else 0
         pairs = np.column_stack([self._loops[side][walk] for side, walk in zip(sides, walks)])
         pairs = pairs[: self._before_valley(mesh.points[pairs]) + 1]
         return Notch(weld, pairs, mesh.points[pairs], keys.minimum_film,
@@ -450,10 +449,13 @@ class Welding:
                 for node, direction in surface_ends(outline, wall.number):
                     if outline.wall[node] == wall.number:  # no weld begins there
                         walk = outline.free_walk(node, direction)
-                        lengths = welds.lengths_from(outline, walk)
-                        joined = int(np.abs(lengths - self.reach).argmin()) if new else 0
+                        joined = self._within_reach(outline, walk) if new else 0
                         yield WallLine(wall, outline, walk, direction, loop, rule, sides=(side,),
                                        size=mesh.geometry, new=new, joined=joined)
+
+    def _within_reach(self, outline: Outline, walk: np.ndarray) -> int:
+        """Number of corners from the first node of a walk to the one nearest to ``reach``."""
+        return int(np.abs(welds.lengths_from(outline, walk) - self.reach).argmin())
 
     def _before_valley(self, nodes: np.ndarray) -> int:
         """Index of the last pair of corners that may join; nodes: (k, 2, 2) um, opposite pairs.

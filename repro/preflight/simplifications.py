@@ -38,9 +38,9 @@ CELL_PECLET = 2.0
 #: 2, 4, 7 and 19 % less biomass in 6 h than with Gear's method at ratios of the transit of 0.009,
 #: 0.027, 0.05, 0.09 and 0.28.
 LAG = 0.05
-#: Largest relative error by one simplification, roughly: the strain of the aggregate by neglected
-#: forces; the flow through the narrowest film, and the uptake of a layer, by elements that widen a
-#: layer of the flow or a front.
+#: Largest relative error by one simplification, roughly. Neglected forces change the strain of the
+#: aggregate. Elements that are too large for a layer change the flow through the narrowest film, or
+#: the uptake.
 ACCEPTED = 0.01
 #: Drag on a half-cylinder on a wall in shear flow, over the wall's shear and the radius: 6.73 in
 #: reference/half_cylinder.py, for a radius much smaller than the pore's width.

@@ -16,7 +16,7 @@ from repro.results.quantities import Quantity, is_modelled
 from repro.scene import Scene
 
 SUBSTRATES = ("acceptor", "donor")
-#: What makes a quantity of substrates at rest jump.
+#: A quantity of substrates at rest jumps where a table for one of these jumps.
 AT_REST = "flow and substrates"
 
 
