@@ -80,7 +80,7 @@ def test_every_node_has_one_place_in_the_order():
 # ---------------------------------------------------------------- Newton's method
 
 
-TOLERANCE, ROUND_OFF = 1e-12, 1e-8
+TOLERANCE, ROUND_OFF = 1e-12, 1e-8  # of a script
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,9 @@ class Script:
     def advanced(self, iterate, factors, fresh):
         return self.iterates[iterate.number + 1]
 
+    def at_round_off(self, iterate):
+        return iterate.defect <= ROUND_OFF
+
 
 @pytest.mark.parametrize("defects, count, converged", [
     ([1.0, 1e-13], 1, True),
@@ -117,7 +120,7 @@ def test_newton_stops_at_the_tolerance_or_at_round_off(defects, count, converged
     """Iteration stops below the tolerance, or once round-off keeps a small defect from falling."""
     assert STALLED == 0.1
     script, most = Script(defects), 4 if converged else 3
-    last, steps, done = Newton(TOLERANCE, ROUND_OFF, most, False).solve(script, script.iterates[0])
+    last, steps, done = Newton(TOLERANCE, most, False).solve(script, script.iterates[0])
     assert (last.number, steps, done) == (count, count, converged)
 
 
@@ -129,5 +132,5 @@ def test_newton_stops_at_the_tolerance_or_at_round_off(defects, count, converged
 def test_newton_gives_up_if_its_defect_stays_large(defects, count, converged):
     """After two iterations the defect has to be 0.5 at most."""
     script = Script(defects)
-    last, steps, done = Newton(TOLERANCE, ROUND_OFF, 10, early=(2, 0.5)).solve(script, script.iterates[0])
+    last, steps, done = Newton(TOLERANCE, 10, early=(2, 0.5)).solve(script, script.iterates[0])
     assert (last.number, steps, done) == (count, count, converged)

@@ -1,6 +1,8 @@
 """The traction that keeps a sliding contact surface in place: a closed form on both walls, and where it acts.
 `test_derived.py` tests the traction that a run reports."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,33 @@ def test_simple_shear_between_two_walls_is_exact(order):
     assert shapes[0].pressure == pytest.approx(np.full(seed.body.solid.shape.corners, g**2 / 3), abs=1e-8)
     assert shapes[0].iterations <= 3
     assert np.abs(shapes[1].position - exact)[upper].max() > 0.1
+
+
+@EVERY_ORDER
+def test_an_equilibrium_a_metre_from_the_origin_stops_at_round_off(order):
+    """There stored positions are rounded by 1e-10 um, and Newton's method cannot reach its tolerance. Its last residual
+    is within the rounding error of every row, with supports too. If one corner moves by a hundred roundings, it is not.
+    """
+    _, seed = block(order)
+    g, shift = 0.3, np.array([1e6, 0.0])
+    solid = replace(seed.body.solid, reference=seed.body.reference + shift)
+    X = solid.reference
+    prescribed = X.copy()
+    rim = seed.region.own_loop
+    prescribed[rim[seed.body.fixed & (seed.body.wall == TOP)], 0] += g * 20.0
+    constrained = mechanics.constrained(len(X), rim, seed.body.wall, seed.body.fixed)
+    forces = on_sides(seed, g)
+    supports = supports_of(seed.body.solid, seed, forces)
+    rest = growth.equilibrium(solid, seed.body.theta, X, np.zeros(solid.shape.corners), constrained, prescribed,
+                               forces=forces, supports=supports)
+    assert rest.position == pytest.approx(X + g * seed.body.reference[:, 1:] * [1.0, 0.0], abs=1e-7)
+    system = growth.System(solid, constrained, forces=forces, supports=supports,
+                           stabilisation=growth.STABILISATIONS[solid.shape.geometry].on(solid, X))
+    last = system.under(seed.body.theta, rest.position, rest.position, rest.pressure)
+    assert last.defect > growth.NEWTON and system.at_round_off(last)
+    moved = rest.position.copy()
+    moved[np.flatnonzero(~constrained.any(axis=1))[0]] += 1e-8
+    assert not system.at_round_off(system.under(seed.body.theta, moved, moved, rest.pressure))
 
 
 @pytest.mark.parametrize("wall, walls", [("sliding", [BOTTOM, TOP]), ("bonded", [TOP])])

@@ -18,7 +18,7 @@ from repro.polling import poll
 #: The modified method keeps a factorisation as long as each iteration reduces the defect to at most
 #: this part.
 REQUIRED_REDUCTION = 0.01
-#: The iteration stalls at round-off if the defect stays above this part of the previous one.
+#: The iteration stalls if the defect stays above this part of the previous one.
 STALLED = 0.1
 
 
@@ -46,18 +46,20 @@ class System(Protocol[State]):
     def advanced(self, iterate: State, factors: Factored, fresh: bool) -> State:
         """The next iterate; fresh: was the derivative computed at this iterate?"""
 
+    def at_round_off(self, iterate: State) -> bool:
+        """Can round-off explain the residual of an iterate?"""
+
 
 @dataclass(frozen=True)
 class Newton:
     """Newton's method.
 
-    tolerance: of the defect; round_off: accepted defect if the iteration stalls; most: largest
+    tolerance: of the defect; an iteration that stalls is also accepted at round-off; most: largest
     number of iterations; modified_newton: does the method keep the derivative while it suffices?;
     early: (n, defect): the method gives up if the defect after n iterations is larger.
     """
 
     tolerance: float
-    round_off: float
     most: int
     modified_newton: bool = False
     early: tuple[int, float] | None = None
@@ -69,8 +71,7 @@ class Newton:
         for count in range(self.most):
             poll()
             defect = iterate.defect
-            stalled = STALLED * last < defect <= self.round_off
-            if iterate.complete and (defect <= self.tolerance or stalled):
+            if iterate.complete and solved(system, iterate, last, self.tolerance):
                 return iterate, count, True
             if self.early and count == self.early[0] and defect > self.early[1]:
                 return iterate, count, False
@@ -81,6 +82,15 @@ class Newton:
             last = defect
             iterate = system.advanced(iterate, factors, fresh)
         return iterate, self.most, False
+
+
+def solved(system: System[State], iterate: State, last: float, tolerance: float) -> bool:
+    """Is the defect of an iterate within a tolerance, or does round-off keep it above?
+
+    last: defect of the previous iterate.
+    """
+    defect = iterate.defect
+    return defect <= tolerance or defect > STALLED * last and system.at_round_off(iterate)
 
 
 def relative(residual: np.ndarray, size: np.ndarray) -> float:

@@ -22,7 +22,7 @@ from repro.errors import GrowthError, failing_as
 from repro.fem import division as dividing
 from repro.fem.assembly import Factored
 from repro.fem.division import Division
-from repro.fem.newton import REQUIRED_REDUCTION, STALLED
+from repro.fem.newton import REQUIRED_REDUCTION, solved
 from repro.fem.outline import Outline
 from repro.model import contact_lines, growth
 from repro.model.contact_lines import CLOSE, FIRST_TRIAL, LEAST_PART, Clearance, Line
@@ -177,12 +177,11 @@ class Coupled:
         iterate = self.placed.iterate(self.position, self.pressure)
         while True:
             poll()
-            stalled = STALLED * last < iterate.defect <= growth.ROUND_OFF
-            solved = iterate.complete and (iterate.defect <= tolerance or stalled)
-            if solved and self._accepts():
+            rests = iterate.complete and solved(self.placed.system, iterate, last, tolerance)
+            if rests and self._accepts():
                 return
             hopeless = self.iterations == EARLY[0] and iterate.defect > EARLY[1]
-            if hopeless or self.iterations == MOST_ITERATIONS or solved and not moving:
+            if hopeless or self.iterations == MOST_ITERATIONS or rests and not moving:
                 raise GrowthError("Newton's method for the contact lines stands at a defect of "
                                   f"{iterate.defect:.2g} after {self.iterations} iterations")
             if iterate.defect > REQUIRED_REDUCTION * last:

@@ -510,6 +510,10 @@ class Balance:
         new = replace(iterate, state=state, residual=self.residual(state, loads), size=size)
         return self._resaturated(iterate, new, concentrations)
 
+    def at_round_off(self, iterate: Iterate) -> bool:
+        """Can round-off explain the residual of an iterate?"""
+        return iterate.defect <= ROUND_OFF
+
     def _linearised(self, iterate: Iterate) -> np.ndarray:
         """(sn,) the residual, with the uptake linearised about the saturations."""
         if self.sink is None or iterate.consistent:
@@ -596,7 +600,7 @@ def steady(problem: Problem, sink: Sink | None,
 @failing_as(TransportError)
 def _newton(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     """(sn,) mg/L, the solution by Newton's method from ``state``, and the number of iterations."""
-    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.scheme.modified_newton)
+    newton = Newton(NEWTON, MOST_ITERATIONS, balance.problem.scheme.modified_newton)
     try:
         last, count, converged = newton.solve(balance, balance.begun(state))
     except LinearError:

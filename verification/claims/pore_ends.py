@@ -139,7 +139,7 @@ def solve_with_prescribed(pore: Pore, solved: Solved, nodes: np.ndarray, part: f
     guess[rows] = part * problem.supply[rows]
     sink = Sink(pore.active)
     balance = transport.Balance(problem, sink)
-    newton = Newton(transport.NEWTON, transport.ROUND_OFF, transport.MOST_ITERATIONS)
+    newton = Newton(transport.NEWTON, transport.MOST_ITERATIONS)
     last, _, converged = newton.solve(balance, balance.begun(guess))
     if not converged:
         raise TransportError(f"Newton's method has not converged: defect {last.defect:.2g}")

@@ -2,6 +2,8 @@
 
 from verification.mutants import changes
 
+ROUND_OFF_TEST = "tests/test_support.py::test_an_equilibrium_a_metre_from_the_origin_stops_at_round_off"
+
 MUTANTS = (
     *changes(
         "repro/model/solid.py",
@@ -137,7 +139,25 @@ MUTANTS = (
          "The tangent lacks the second derivative of the energy.",
          "System.tangent",
          "K += np.swapaxes(g, 1, 2) @ each(dx * curvature, g)",
-         "pass")),
+         "pass"),
+        ("round-off-of-one-node",
+         "The rounding error of a row is a tenth of that of one number.",
+         "System.at_round_off",
+         "(self.solid.shape.cells.shape[1] + 1) * UNIT_ROUND_OFF * terms",
+         "UNIT_ROUND_OFF / 10 * terms",
+         ROUND_OFF_TEST),
+        ("round-off-of-some-rows",
+         "A residual counts as round-off if one row is within its rounding error.",
+         "System.at_round_off",
+         "(np.abs(iterate.residual) <= errors)[self.free].all()",
+         "(np.abs(iterate.residual) <= errors)[self.free].any()",
+         ROUND_OFF_TEST),
+        ("round-off-without-supports",
+         "The rounding error at a fixed point does not spread over the surface that it supports.",
+         "System.at_round_off",
+         "terms[: len(share)] += terms[support.point] * share",
+         "terms[: len(share)] = 0.0",
+         ROUND_OFF_TEST)),
     *changes(
         "repro/model/energies/neo_hookean.py",
         ("biot-of-a-layer",
