@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from repro import results
-from repro.errors import RunEnd, printable
+from repro.errors import RunEnd, printable, shortened
 from repro.march.simulation import report_at, reports, steps
 from repro.march.state import SAME_TIME, Report, RestartState
 from repro.results import drawing, names, outlines, sampling
@@ -431,7 +431,7 @@ class Results(Mapping[str, np.ndarray]):
                 lines += [self.outline(each, int(number)) for number in present if number]
             if not lines:
                 raise KeyError(f"{OUTLINES}: this run has no aggregate at these times")
-            heading, box = title or self.name, drawing.corners(fields)
+            heading, box = title or shortened(self.name), drawing.corners(fields)
             return drawing.drawn_outlines(lines, heading, box, ax, photograph=photograph,
                                           style=style)
         if isinstance(time, Sequence) and not isinstance(time, str):

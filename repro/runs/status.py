@@ -1,5 +1,7 @@
 """The ``status`` of a run in its ``run.json``."""
 
+import re
+
 COMPLETED = "completed"
 RUNNING = "running"
 INTERRUPTED = "interrupted"
@@ -7,6 +9,8 @@ INTERRUPTED = "interrupted"
 NOT_RUN = "not run"
 #: Prefix of a status that states the reason of a failure.
 FAILED = "failed: "
+#: In every message of an end of the model.
+TIME = re.compile(r" t = \S+ h\b")
 
 
 def is_fold(status: str) -> bool:
@@ -16,4 +20,10 @@ def is_fold(status: str) -> bool:
 
 def is_over(status: str) -> bool:
     """Has the run reached the end of its scene, or of the model: :class:`repro.errors.RunEnd`?"""
-    return status not in (RUNNING, INTERRUPTED, NOT_RUN) and not status.startswith(FAILED)
+    return status == COMPLETED or bool(TIME.search(status)) and not status.startswith(FAILED)
+
+
+def is_known(status: str) -> bool:
+    """Is it a status that this version writes?"""
+    return (is_over(status) or status in (RUNNING, INTERRUPTED, NOT_RUN)
+            or status.startswith(FAILED))
