@@ -13,20 +13,16 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from time import perf_counter
-from typing import TypeAlias
 
 from repro.errors import RunEnd
 from repro.march.simulation import rows_within
 from repro.march.simulation import steps as iterate_steps
-from repro.march.state import Report, RestartState
+from repro.march.state import Report
 from repro.march.step_control import SHORTEST, exceeds_tolerance
 from repro.polling import poll
 from repro.preflight.memory import MB, expected_bytes
 from repro.preflight.outlook import MOST_NODES, CoarseRun
 from repro.scene import Scene
-
-#: The state after a step and, if the step is reported, its row.
-ReportedStep: TypeAlias = tuple[RestartState, Report | None]
 
 #: Length of the trial over growth.time_step. Its first step is slow; the fastest one counts.
 FIRST_STEPS = 3

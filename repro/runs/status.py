@@ -9,8 +9,6 @@ INTERRUPTED = "interrupted"
 NOT_RUN = "not run"
 #: Prefix of a status that states the reason of a failure.
 FAILED = "failed: "
-#: In every message of an end of the model.
-TIME = re.compile(r" t = \S+ h\b")
 
 
 def is_fold(status: str) -> bool:
@@ -20,7 +18,8 @@ def is_fold(status: str) -> bool:
 
 def is_over(status: str) -> bool:
     """Has the run reached the end of its scene, or of the model: :class:`repro.errors.RunEnd`?"""
-    return status == COMPLETED or bool(TIME.search(status)) and not status.startswith(FAILED)
+    names_time = re.search(r" t = \S+ h\b", status)  # as the message of every end of the model
+    return status == COMPLETED or bool(names_time) and not status.startswith(FAILED)
 
 
 def is_known(status: str) -> bool:

@@ -544,7 +544,7 @@ MUTANTS = (
         ("moles-of-time",
          "A capital M in a time is answered with moles.",
          "_unfit",
-         "unit in MASSES and _MOLES.search(from_unit)",
+         'unit in ("mg/L", "1/h") and _MOLES.search(from_unit)',
          "_MOLES.search(from_unit)",
          "tests/test_scene_refusals.py::test_hints_are_given_only_if_they_help"),
         ("whole-unit-refused",
@@ -879,14 +879,14 @@ MUTANTS = (
         ("list-leads-out",
          "Every path that run.json lists counts as a file of the run.",
          "list_written_files",
-         "names = {name for name in listed if name in own or FIELDS.fullmatch(name)}",
-         "names = {name for name in listed if name}",
+         "is_own(name) or name == 'timeseries.nc'",
+         "name",
          "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files"),
         ("former-files-stay",
          "The NetCDF file of a run of an earlier version stays beside the run that replaces it.",
          "list_written_files",
-         "name in own",
-         "name in RUN_FILES",
+         "is_own(name) or name == 'timeseries.nc'",
+         "is_own(name)",
          "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files")),
     *changes(
         "repro/runs/execution.py",
@@ -1589,26 +1589,18 @@ MUTANTS = (
         ("sweep-ignores-seed",
          "The command ignores --seed.",
          "call",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
-         "scheduler=options.scheduler, clogged=options.clogged, progress=on_terminal and not options.quiet, "
-         "tell=None if on_terminal or options.quiet else _print_run)",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, workers=options.workers, scheduler=options.scheduler, "
-         "clogged=options.clogged, progress=on_terminal and not options.quiet, tell=None if on_terminal or "
-         "options.quiet else _print_run)",
+         "('points', 'unset', 'samples', 'seed')",
+         "('points', 'unset', 'samples')",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect"),
         ("sweep-ignores-clogged",
          "The command ignores --clogged.",
          "call",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
+         "driver.sweep(options.scene, options.vary, options.out, options.set, **design, workers=options.workers, "
          "scheduler=options.scheduler, clogged=options.clogged, progress=on_terminal and not options.quiet, "
          "tell=None if on_terminal or options.quiet else _print_run)",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
-         "scheduler=options.scheduler, progress=on_terminal and not options.quiet, tell=None if on_terminal "
-         "or options.quiet else _print_run)",
+         "driver.sweep(options.scene, options.vary, options.out, options.set, **design, workers=options.workers, "
+         "scheduler=options.scheduler, progress=on_terminal and not options.quiet, "
+         "tell=None if on_terminal or options.quiet else _print_run)",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect")),
     *changes(
         "repro/sweeps/driver.py",
@@ -2909,7 +2901,7 @@ MUTANTS = (
         ("missing-value-is-a-word",
          "A missing value of a column of words is a word.",
          "_tabulated",
-         "text.lower() in NO_VALUE",
+         "text.lower() in (\"\", \"nan\", \"none\", \"nat\", \"<na>\", \"inf\", \"-inf\")",
          "False",
          f"{POINTS}bad_points_are_refused_in_one_line")),
     *changes(
