@@ -30,7 +30,6 @@ MOST_STEPS = 9  # of the trial, if its steps are shorter
 #: The trial replaces a mesh of more than MOST_NODES by a coarser one. Time grows with the nodes to
 #: this power.
 POWER = 1.2
-COARSER = 0.9
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ def run_trial(scene: Scene, nodes: int, advance: bool = True) -> Trial:
     advance: make steps? Raises SimulationError if a stage fails.
     """
     if nodes > MOST_NODES:
-        size = scene.numerics.refinement * COARSER * math.sqrt(MOST_NODES / nodes)
+        size = scene.numerics.refinement * math.sqrt(MOST_NODES / nodes)
         scene = replace(scene, numerics=replace(scene.numerics, refinement=size))
     if scene.growth:
         end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step) if advance else 0.0

@@ -6,23 +6,12 @@ from repro.march.simulation import row_times
 from repro.scene import Aggregate, Scene, scene_tables
 from repro.scene.time_table import TimeTable
 
-LEFT_OUT = {
-    "aggregate": "no aggregate: a clean channel",
-    "flow": "no flow: pure diffusion",
-    "substrates": "no substrates: no transport is assembled",
-    "kinetics": "no uptake, which needs substrates and an aggregate",
-    "growth": "no growth: only the state at t = 0",
-}
-
 
 def describe_model(scene: Scene) -> list[tuple[str, str]]:
     """(section, description) in the order of the scene, including absent sections."""
-    words = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
-             "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
-    absent = {name for name in LEFT_OUT.keys() - {"aggregate"} if getattr(scene, name) is None}
-    absent |= set() if scene.aggregates else {"aggregate"}
-    return [(name, LEFT_OUT[name] if name in absent else "; ".join(describe(scene)))
-            for name, describe in words.items()]
+    sections = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
+                "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
+    return [(name, "; ".join(describe(scene))) for name, describe in sections.items()]
 
 
 def _pore(scene: Scene) -> Iterator[str]:
@@ -38,6 +27,8 @@ def _pore(scene: Scene) -> Iterator[str]:
 
 
 def _aggregate(scene: Scene) -> Iterator[str]:
+    if not scene.aggregates:
+        yield "no aggregate: a clean channel"
     several = len(scene.aggregates) > 1
     for label, seed in zip(scene.labels, scene.aggregates):
         yield f"{label}: {_seed(seed)}" if several else _seed(seed)
@@ -58,6 +49,9 @@ def _seed(seed: Aggregate) -> str:
 
 def _flow(scene: Scene) -> Iterator[str]:
     flow = scene.flow
+    if flow is None:
+        yield "no flow: pure diffusion"
+        return
     yield "Stokes flow (1)-(6)"
     if flow.rate is not None:
         rate = _over_time(flow.rate, 1e-9 / 60, "uL/min")
@@ -75,6 +69,9 @@ def _flow(scene: Scene) -> Iterator[str]:
 
 
 def _substrates(scene: Scene) -> Iterator[str]:
+    if scene.substrates is None:
+        yield "no substrates: no transport is assembled"
+        return
     carried = "advection and diffusion" if scene.flow else "diffusion"
     supplies = {name: f"{name} ({_over_time(kind.supply, 1.0, 'mg/L')})"
                 for name, kind in scene.substrates.modelled.items()}
@@ -95,8 +92,7 @@ def _substrates(scene: Scene) -> Iterator[str]:
 
 
 def _equations(scene: Scene) -> str:
-    numbers = {"acceptor": "(7)", "donor": "(8)"}
-    return "-".join(numbers[name] for name in scene.substrates.modelled)
+    return "-".join({"acceptor": "(7)", "donor": "(8)"}[name] for name in scene.substrates.modelled)
 
 
 def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
@@ -110,6 +106,9 @@ def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:
+    if scene.kinetics is None:
+        yield "no uptake, which needs substrates and an aggregate"
+        return
     law = scene.kinetics.law
     alone = len(scene.substrates.modelled) == 1
     name = law.removeprefix("dual ") if alone else law
@@ -126,6 +125,9 @@ def _kinetics(scene: Scene) -> Iterator[str]:
 
 def _growth(scene: Scene) -> Iterator[str]:
     growth = scene.growth
+    if growth is None:
+        yield "no growth: only the state at t = 0"
+        return
     limit = f" with J_m = {growth.limiting_invariant:g}" if growth.energy == "Gent" else ""
     yield (f"to {growth.end:g} h: an incompressible {growth.energy} body{limit} that expands with "
            "its biomass, (14)-(29)")

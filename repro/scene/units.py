@@ -379,20 +379,17 @@ class Points:
 
     def read(self, value: object) -> tuple[tuple[float, float], ...] | Drawn:
         if isinstance(value, dict):
-            return self._drawn(value)
+            if value.keys() != {"file", "um_per_unit"} or not isinstance(value["file"], str):
+                raise ValueError("a file has the keys file and um_per_unit")
+            try:
+                return Drawn(value["file"], self.scale.read(value["um_per_unit"]))
+            except ValueError as error:
+                raise Refused("um_per_unit, the length of a unit or pixel in um, is a plain number "
+                              f"greater than zero{because(error)}") from None
         points = as_list(value)
         if points is None or not 3 <= len(points) <= MOST_POINTS:
             raise ValueError(_wrong_type(value))
         return tuple(_each("point", self._point, points))
-
-    def _drawn(self, value: dict) -> Drawn:
-        if value.keys() != {"file", "um_per_unit"} or not isinstance(value["file"], str):
-            raise ValueError("a file has the keys file and um_per_unit")
-        try:
-            return Drawn(value["file"], self.scale.read(value["um_per_unit"]))
-        except ValueError as error:
-            raise Refused("um_per_unit, the length of a unit or pixel in um, is a plain number "
-                          f"greater than zero{because(error)}") from None
 
     def _point(self, value: object) -> tuple[float, float]:
         pair = as_list(value)
