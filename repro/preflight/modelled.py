@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from repro.march.simulation import row_times
+from repro.results.quantities import UNITS
 from repro.scene import Aggregate, Scene, scene_tables
 from repro.scene.time_table import TimeTable
 
@@ -54,12 +55,12 @@ def _flow(scene: Scene) -> Iterator[str]:
         return
     yield "Stokes flow (1)-(6)"
     if flow.rate is not None:
-        rate = _over_time(flow.rate, 1e-9 / 60, "uL/min")
+        rate = _over_time(flow.rate, "_uL_per_min")
         yield f"driven by {rate} through a depth of {scene.pore.depth:g} um"
     elif flow.head is None:
-        yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, 24e-6, 'm/day')}"
+        yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, '_m_per_d')}"
     else:
-        yield f"driven by a head of {_over_time(flow.head, 1e-4, 'cm')} over the whole pore"
+        yield f"driven by a head of {_over_time(flow.head, '_cm')} over the whole pore"
     if scene.aggregates:
         yield (f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
                if flow.permeability is None else "an aggregate with a permeability of "
@@ -73,7 +74,7 @@ def _substrates(scene: Scene) -> Iterator[str]:
         yield "no substrates: no transport is assembled"
         return
     carried = "advection and diffusion" if scene.flow else "diffusion"
-    supplies = {name: f"{name} ({_over_time(kind.supply, 1.0, 'mg/L')})"
+    supplies = {name: f"{name} ({_over_time(kind.supply, '_mg_per_L')})"
                 for name, kind in scene.substrates.modelled.items()}
     yield f"{carried} of {' and '.join(supplies.values())}, {_equations(scene)}"
     if len(supplies) == 1:
@@ -95,8 +96,9 @@ def _equations(scene: Scene) -> str:
     return "-".join({"acceptor": "(7)", "donor": "(8)"}[name] for name in scene.substrates.modelled)
 
 
-def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
-    """A value in a unit, or the range of its table."""
+def _over_time(value: float | TimeTable, ending: str) -> str:
+    """A value in the unit with this ending of names, or the range of its table."""
+    unit, factor = UNITS[ending].symbol, UNITS[ending].factor
     if not isinstance(value, TimeTable):
         return f"{factor * value:.4g} {unit}"
     least = factor * min(value.values)
