@@ -13,8 +13,6 @@ from repro.results.outlines import boundary
 
 #: Rows of the table, and outlines in the picture, without a row for the contact.
 SEVERAL = 5
-#: A relative change that the sentence does not name.
-UNCHANGED = 1e-3
 WIDTH = 640  # of the picture
 MARGIN = 8
 def build(run: Run) -> str:
@@ -57,7 +55,7 @@ def _change(noun: str, name: str, run: Run) -> str:
     """The first and the last value of a column, and the factor between those of the pore."""
     values = run.series[name]
     first, last = values[np.isfinite(values)][[0, -1]]
-    if abs(last - first) <= UNCHANGED * abs(first):
+    if _short(first) == _short(last):
         stays = "stays at" if len(values) > 1 else "is"
         return f"The {noun} {stays} {_short(first)} {names.unit(name)}."
     verb = "falls" if last < first else "rises"

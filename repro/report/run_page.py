@@ -107,9 +107,9 @@ def _field_note(packed: dict) -> str:
     in_bodies = any(field["body"] for field in packed["fields"])
     fluid = ", and the fluid where a field exists in the aggregate alone" if in_bodies else ""
     slider = " Arrow keys also move the slider." if total > 1 else ""
-    return (f"{note}; {times}{besides}. Values are rounded to 1/65534 of their range; the .vtu "
-            "files have every time and digit. Colours span the values that are shown, on a "
-            "logarithmic scale from a factor of 100 on, over four decades at most. Grey is the "
+    return (f"{note}; {times}{besides}. Values are rounded to 1/{fields.LEVELS} of their range; "
+            "the .vtu files have every time and digit. Colours span the values that are shown, on "
+            "a logarithmic scale from a factor of 100 on, over four decades at most. Grey is the "
             f"part of the pore that is not meshed at that time{fluid}. Point at the picture for a "
             f"value, or focus it and press the arrow keys.{slider}")
 
