@@ -159,7 +159,6 @@ def _stress(k: int, state: State) -> np.ndarray:
 
 
 _FITTED = "of the points where growth is integrated, fitted linearly in each triangle"
-_CAUCHY = "of mu_L (J^(-5/3) (F F^T - tr C / 3) + P / mu_L), the mean over the triangle at t = 0"
 
 ARRAYS = (
     Array("velocity_m_per_d", "velocity", "u (1)-(5)",
@@ -191,7 +190,8 @@ ARRAYS = (
     Array("surface_stretch", "elastic stretch along the free surface",
           f"{STRETCH}; in the triangles at the free surface, of two edges the lesser", _stretch,
           needs="growth", cells=True, body=True),
-    *(Array(f"stress_{axes}_MPa", f"stress {axes}", f"Cauchy stress {axes}, {_CAUCHY}",
+    *(Array(f"stress_{axes}_MPa", f"stress {axes}", f"Cauchy stress {axes}, of mu_L "
+            "(J^(-5/3) (F F^T - tr C / 3) + P / mu_L), the mean over the triangle at t = 0",
             partial(_stress, k), needs="stress", cells=True, body=True, signed=True)
       for k, axes in enumerate(("xx", "yy", "zz", "xy"))),
     Array("largest_principal_stress_MPa", "largest principal stress",
