@@ -88,7 +88,7 @@ def test_the_page_begins_with_the_answer(fast, flow_only):
 def test_the_outlines_are_those_of_the_aggregate(request, name):
     """Their points are as thick as the aggregate above the wall, and as long, in the scale of the picture."""
     run = read(request.getfixturevalue(name))
-    text = answer._picture(run)
+    text = answer.build(run)
     paths = re.findall(r'<path class="line(\d)" d="([^"]+)"', text)
     times = [float(time) for time in re.findall(r"</svg>([\d.]+) h<", text)]
     assert [int(colour) for colour, _ in paths] == list(range(len(paths))) and len(paths) == len(times) == 5

@@ -13,6 +13,7 @@ from repro.cli.arguments import add_scene, path
 from repro.errors import Interrupted, printable
 from repro.runs.interrupts import on_first_signal
 from repro.runs.progress import say
+from repro.sweeps import CLOGGED
 
 if TYPE_CHECKING:
     from repro.sweeps.driver import Swept
@@ -50,9 +51,9 @@ def add(commands) -> None:
                          help="number of parallel runs (default: one per core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT",
                          help="address of a Dask scheduler whose workers make the runs")
-    command.add_argument("--clogged", metavar="PART", type=float, default=0.1,
+    command.add_argument("--clogged", metavar="PART", type=float, default=CLOGGED,
                          help="fraction of the first conductivity at which a pore counts as "
-                         "clogged (default: 0.1)")
+                         "clogged (default: %(default)g)")
     command.add_argument("--dry-run", action="store_true",
                          help="print the number of points, and roughly the time and disk space "
                          "that they need, from trials of at most three; write nothing")

@@ -15,12 +15,20 @@ from repro.results.outlines import boundary
 SEVERAL = 5
 WIDTH = 640  # of the picture
 MARGIN = 8
+
+
 def build(run: Run) -> str:
     """Sentence, table and picture; a sentence alone of a run without rows."""
     if not len(run.times):
         return "<p>The run has no row: it stopped before the first.</p>"
     table = page.table("", ["t (h)", *map(names.with_unit, _columns(run))], _rows(run))
-    return f'<p class="answer">{escape(sentence(run))}</p>{table}{_picture(run)}'
+    picture = ""
+    if entries := fields.index(run.folder) if "aggregate" in run.record["tables"] else []:
+        evenly = np.linspace(0, len(entries) - 1, SEVERAL).round().astype(int)
+        chosen = [entries[k] for k in np.unique(evenly)]
+        picture = outlines([time for time, _ in chosen],
+                           [field_files.read(path) for _, path in chosen])
+    return f'<p class="answer">{escape(sentence(run))}</p>{table}{picture}'
 
 
 def sentence(run: Run) -> str:
@@ -80,16 +88,6 @@ def _rows(run: Run) -> list[list[str]]:
              *quantities.contact(run)}
     return [[f"{time:.6g}", *(_short(run.series[name][run.times == time][-1])
                               for name in _columns(run))] for time in sorted(times)]
-
-
-def _picture(run: Run) -> str:
-    """The outlines of the aggregates at several times; empty without fields of an aggregate."""
-    entries = fields.index(run.folder) if "aggregate" in run.record["tables"] else []
-    if not entries:
-        return ""
-    evenly = np.linspace(0, len(entries) - 1, SEVERAL).round().astype(int)
-    chosen = [entries[k] for k in np.unique(evenly)]
-    return outlines([time for time, _ in chosen], [field_files.read(path) for _, path in chosen])
 
 
 def outlines(times: list[float], grids: list[Grid]) -> str:
