@@ -158,7 +158,10 @@ class BalanceError(StageError):
 
 
 class RunEnd(Exception):
-    """The model ends before ``growth.end``: an end of :mod:`repro.march.ends`. No failure."""
+    """The model ends before ``growth.end``: an end of :mod:`repro.march.ends`. No failure.
+
+    Its message has the time, as "t = 3.5 h": the status of a run shows by it that the run is over.
+    """
 
 
 class SimulationError(RuntimeError):

@@ -12,7 +12,6 @@ from typing import ParamSpec, TypeVar
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 Function = Callable[Arguments, Result]
-BAR = "{percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed} < {remaining}]"
 
 #: Seconds by stage since the last :func:`reset`; nested calls count in both stages.
 seconds: defaultdict[str, float] = defaultdict(float)
@@ -68,7 +67,8 @@ def progress_bar(shown: bool, unit: str) -> Iterator[Callable[[float, float], No
         return
     from tqdm.auto import tqdm
 
-    with tqdm(total=1.0, unit=unit, bar_format=BAR, delay=1e-3) as bar:
+    form = "{percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed} < {remaining}]"
+    with tqdm(total=1.0, unit=unit, bar_format=form, delay=1e-3) as bar:
         def show(reached: float, total: float) -> None:
             if total and total != bar.total:
                 bar.reset(total)

@@ -91,7 +91,9 @@ FOLLOWED = {
         "and use --resume": "tests/test_folder.py::test_foreign_files_are_not_replaced",
         "use --resume": "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line",
         "repeat the command": "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line"},
-    "runs/machine.py": {"or leave the key out": PACKAGES},
+    "runs/integrity.py": {"or --force": "tests/test_resume.py::"
+                          "test_a_run_of_unknown_status_is_neither_resumed_nor_repeated"},
+    "runs/machine.py": {"leave the key out": PACKAGES},
     "runs/recorder.py": {"continues the run": SIGNALS},
     "scene/rules.py": {"removes it": PAIRS},
     "scene/text.py": {"remove it to set the key":
@@ -145,10 +147,9 @@ def test_packages_to_install_are_those_that_the_project_names():
     """They are optional dependencies. A scene without the keys that need them can be run."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     named = {re.match(r"[\w-]+", entry)[0] for entries in extras.values() for entry in entries}
-    assert named >= {*machine.OPTIONAL.values(), "matplotlib", "pillow", "xarray", "distributed"}
-    for key, choice in machine.OPTIONAL:
-        scene = load_scene("base", [f"numerics.{key}={choice}"])
-        machine.require_packages(load_scene(scene, unset=[f"numerics.{key}"]))
+    assert named >= {"pypardiso", "matplotlib", "pillow", "xarray", "distributed"}
+    scene = load_scene("base", ["numerics.solver=pardiso"])
+    machine.require_packages(load_scene(scene, unset=["numerics.solver"]))
 
 
 @pytest.mark.parametrize("name, content, options, advice", [

@@ -43,8 +43,10 @@ FALLING = {"conductivity_m_per_d": [100.0, 60.0, 25.0]}
      "area of the aggregate rises from 40 to 80 um², by a factor of 2."),
     (made(conductivity_m_per_d=[174.0], tables={}), "One row, at t = 0 h. The conductivity is 174 m/day."),
     (made(conductivity_m_per_d=[np.nan, 8.0, 4.0, np.nan], tables={}),
-     "4 rows, to t = 3 h. The conductivity falls from 8 to 4 m/day, by a factor of 2.")],
-    ids=["contact", "effluents", "leaves", "erodes", "no flow", "one row", "gaps"])
+     "4 rows, to t = 3 h. The conductivity falls from 8 to 4 m/day, by a factor of 2."),
+    (made(conductivity_m_per_d=[1.231, 1.233], tables={}),
+     "2 rows, to t = 1 h. The conductivity stays at 1.23 m/day.")],
+    ids=["contact", "effluents", "leaves", "erodes", "no flow", "one row", "gaps", "equal digits"])
 def test_the_sentence_has_contact_conductivity_and_effluents(run, expected):
     """Physics that is not modelled is not mentioned."""
     assert answer.sentence(run) == expected
@@ -86,7 +88,7 @@ def test_the_page_begins_with_the_answer(fast, flow_only):
 def test_the_outlines_are_those_of_the_aggregate(request, name):
     """Their points are as thick as the aggregate above the wall, and as long, in the scale of the picture."""
     run = read(request.getfixturevalue(name))
-    text = answer._picture(run)
+    text = answer.build(run)
     paths = re.findall(r'<path class="line(\d)" d="([^"]+)"', text)
     times = [float(time) for time in re.findall(r"</svg>([\d.]+) h<", text)]
     assert [int(colour) for colour, _ in paths] == list(range(len(paths))) and len(paths) == len(times) == 5

@@ -78,6 +78,30 @@ def test_a_film_has_every_row_in_one_view_and_one_palette(results, tmp_path):
     assert (frames[0] != frames[-1]).any()
 
 
+def test_a_film_has_the_colours_of_its_colour_bar_in_all_frames(tmp_path):
+    """The values of the first frame fill a small part of the scale. All colours of the map are close to those drawn."""
+    run = repro.solve("base", {"numerics.preset": "sketch", "growth.end": "6 h", "output.times": ["0 h", "6 h"]})
+    axes = run.animate("acceptor", tmp_path / "film.gif")
+    bar, figure = axes.child_axes[0].get_window_extent(), axes.figure.bbox
+    with Image.open(tmp_path / "film.gif") as film:
+        frames = [np.asarray(frame.convert("RGB"), float) for frame in ImageSequence.Iterator(film)]
+    for frame in frames:
+        scale = len(frame) / figure.height
+        column = frame[:, round(scale * (bar.x0 + bar.x1) / 2)]
+        inside = column[round(len(frame) - scale * bar.y1) + 2:round(len(frame) - scale * bar.y0) - 2]
+        colours = 255 * plt.get_cmap()(np.linspace(1, 0, len(inside)))[:, :3]
+        assert len(frames) == 2 and len(inside) > 100 and np.abs(inside - colours).max() < 20
+
+
+def test_the_title_of_a_long_name_leaves_room_for_the_axes(results, monkeypatch):
+    """The name of a file may have 240 letters."""
+    monkeypatch.setattr(results, "name", "n" * 240)
+    for axes in (results.plot()[0], results.plot("donor", time=0.2), results.plot("outlines")):
+        axes.figure.canvas.draw()
+        assert axes.get_title(loc="left").startswith("n" * 57 + "...")
+        assert axes.get_window_extent().width > 0.5 * axes.figure.bbox.width
+
+
 @pytest.mark.parametrize("call, error, message", [
     (lambda run, file: run.animate("donor", file.with_suffix(".avi")), ValueError, "that ends in .gif or .mp4"),
     (lambda run, file: run.animate("doner", file), KeyError, "no such column or field; did you mean donor"),

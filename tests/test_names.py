@@ -62,6 +62,7 @@ def test_names_of_any_bytes_pass_through_commands(tmp_path, monkeypatch):
 
 
 @pytest.mark.filterwarnings("ignore:Glyph")
+@pytest.mark.usefixtures("close_figures")
 @pytest.mark.thorough
 @pytest.mark.parametrize("terminal", TERMINALS)
 @pytest.mark.parametrize("kind", NAMES)

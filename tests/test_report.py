@@ -245,7 +245,8 @@ def test_the_state_before_an_expansion_is_shown_before_that_after_it(tmp_path):
     folder = run(tmp_path, "base", "growth.end=0.6 h", 'output.times=["0 h", "0.4 h", "0.6 h"]')
     packed = page_data(folder)
     frames = [(frame["time"], frame.get("note")) for frame in packed["frames"]]
-    assert frames == [(0, None), (0.4, fields.BEFORE), (0.4, None), (0.6, fields.BEFORE), (0.6, None)]
+    note = "before the expansion"
+    assert frames == [(0, None), (0.4, note), (0.4, None), (0.6, note), (0.6, None)]
     before, after = packed["frames"][1:3]
     assert before["values"]["theta"][1] > after["values"]["theta"][1] or before["points"] != after["points"]
     assert "all 3 times shown, those grown and not yet expanded besides" in text_of(folder)

@@ -11,10 +11,12 @@ from unittest.mock import Mock
 
 import pytest
 
+import repro
 from repro import timing
 from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.model import growth
+from repro.results import write_sealed
 from repro.runs import execution, machine
 from repro.runs.checkpoint import NEWEST, PREVIOUS
 from repro.runs.execution import Watch, resume, run
@@ -201,6 +203,29 @@ def test_a_run_killed_repeatedly_equals_the_uninterrupted_run(tmp_path, seed):
         arguments = ["--resume", out]
     assert status == 0 and len(read_record(out)["resumes"]) > 0
     assert files(out) == files(uninterrupted) and lasting_record(out) | {"origin": {}} == lasting_record(uninterrupted)
+
+
+@pytest.mark.parametrize("status", ["paused", "", "failed"])
+def test_a_run_of_unknown_status_is_neither_resumed_nor_repeated(status, tmp_path, capsys):
+    """It may be over, in another version. Its rows load, and --force replaces it."""
+    out = tmp_path / "run"
+    assert main(["run", "flow_only", "--quiet", "--out", str(out)]) == 0
+    write_sealed(out / "run.json", read_record(out) | {"status": status})
+    before = files(out)
+    for command in (["run", "flow_only", "--out", str(out)], ["run", "--resume", str(out)], ["check", str(out)]):
+        capsys.readouterr()
+        assert main(command) == 2
+        (message,) = capsys.readouterr().err.splitlines()
+        assert message.startswith(f"repro: {out}: run.json has the status {status!r}, which this version does not know")
+    swept = ["sweep", "flow_only", "--vary", "pore.width=50 um", "--workers", "1", "--quiet",
+             "--out", str(tmp_path / "swept")]
+    assert main(swept) == 0
+    (point,) = (tmp_path / "swept" / "runs").iterdir()
+    write_sealed(point / "run.json", read_record(point) | {"status": status})
+    assert main(swept) == 3 and read_record(point)["status"] == status
+    assert files(out) == before and repro.load_run(out).status == status
+    assert main(["run", "flow_only", "--quiet", "--force", "--out", str(out)]) == 0
+    assert read_record(out)["status"] == "completed"
 
 
 @pytest.mark.thorough

@@ -123,8 +123,6 @@ def test_unset_removes_keys_and_sections():
 
 def units_of_same_kind(unit):
     """The names of units of the same kind."""
-    if unit == "rad":
-        return units.ANGLES
     return [other for other, one in exact.UNITS.items() if one[1:] == exact.UNITS[unit][1:]]
 
 

@@ -3,8 +3,6 @@
 Without a quantity and a file, list what can be drawn.
 """
 
-from functools import partial
-
 from repro.cli.arguments import path
 from repro.errors import OutputError, printable
 from repro.runs.progress import say
@@ -69,14 +67,13 @@ def call(options) -> int:
                 raise OutputError(f"{options.out}: a film needs QUANTITY and accepts no --time")
             results.animate(options.field, options.out, **style)
         else:
-            times = options.time
-            draw = partial(results.plot, options.field, image=options.image, corner=options.corner,
-                           time=times[0] if times and len(times) == 1 else times,
-                           um_per_pixel=options.um_per_pixel, **style)
             from repro.results.files import output_path
 
+            times = options.time
             with output_path(options.out) as beside:
-                axes = draw()
+                axes = results.plot(options.field, image=options.image, corner=options.corner,
+                                    time=times[0] if times and len(times) == 1 else times,
+                                    um_per_pixel=options.um_per_pixel, **style)
                 figure = (axes[0] if isinstance(axes, list) else axes).figure
                 figure.savefig(beside, dpi=150)
     except (ImportError, KeyError, TypeError, ValueError) as error:

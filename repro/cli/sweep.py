@@ -7,20 +7,17 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene, path
 from repro.errors import Interrupted, printable
 from repro.runs.interrupts import on_first_signal
 from repro.runs.progress import say
+from repro.sweeps import CLOGGED
 
 if TYPE_CHECKING:
     from repro.sweeps.driver import Swept
 
-#: Exit status if some runs have failed.
-SOME_FAILED = 3
 EPILOG = """\
 --vary takes a range KEY=a:b UNIT:linear|log:N or a list KEY=VALUE, VALUE, ... Several --vary make a
 grid. --points takes a CSV file instead, with a run in each row. With --samples a range has no N:
@@ -54,9 +51,9 @@ def add(commands) -> None:
                          help="number of parallel runs (default: one per core)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT",
                          help="address of a Dask scheduler whose workers make the runs")
-    command.add_argument("--clogged", metavar="PART", type=float, default=0.1,
+    command.add_argument("--clogged", metavar="PART", type=float, default=CLOGGED,
                          help="fraction of the first conductivity at which a pore counts as "
-                         "clogged (default: 0.1)")
+                         "clogged (default: %(default)g)")
     command.add_argument("--dry-run", action="store_true",
                          help="print the number of points, and roughly the time and disk space "
                          "that they need, from trials of at most three; write nothing")
@@ -69,36 +66,27 @@ def call(options) -> int:
     from repro.sweeps import driver
 
     driver.refuse_values(options.workers, options.seed, options.clogged)
+    design = {name: getattr(options, name) for name in ("points", "unset", "samples", "seed")}
     if options.dry_run:
         from repro.sweeps import expected, pool
 
-        plan = driver.plan(options.scene, options.vary, options.out or "", options.set,
-                           points=options.points, unset=options.unset, samples=options.samples,
-                           seed=options.seed)
+        plan = driver.plan(options.scene, options.vary, options.out or "", options.set, **design)
         workers = min(options.workers or pool.cores(), len(plan.points))
         say(printable(expected.describe(plan, workers)))
         return 0
-    on_terminal = sys.stderr.isatty()
-    with _end_on_signals(options.command_line):
-        swept = driver.sweep(options.scene, options.vary, options.out, options.set,
-                             points=options.points, unset=options.unset,
-                             samples=options.samples, seed=options.seed, workers=options.workers,
-                             scheduler=options.scheduler, clogged=options.clogged,
-                             progress=on_terminal and not options.quiet,
-                             tell=None if on_terminal or options.quiet else _print_run)
-    return _report(swept)
 
-
-@contextmanager
-def _end_on_signals(command: str) -> Iterator[None]:
-    """End the sweep on the first signal; the message gives the command that continues it."""
     def end(number: int) -> None:
         cause = "interrupted" if number == signal.SIGINT else "terminated"
-        raise Interrupted(f"{cause}; the results so far are written, and {command} continues the "
-                          "sweep", number)
+        raise Interrupted(f"{cause}; the results so far are written, and {options.command_line} "
+                          "continues the sweep", number)
 
+    on_terminal = sys.stderr.isatty()
     with on_first_signal(end):
-        yield
+        swept = driver.sweep(options.scene, options.vary, options.out, options.set, **design,
+                             workers=options.workers, scheduler=options.scheduler,
+                             clogged=options.clogged, progress=on_terminal and not options.quiet,
+                             tell=None if on_terminal or options.quiet else _print_run)
+    return _report(swept)
 
 
 def _print_run(event: dict) -> None:
@@ -116,4 +104,4 @@ def _report(swept: Swept) -> int:
     finished = len(swept.runs) - len(swept.failed)
     say(printable(f"{swept.source}: {finished} of {len(swept.runs)} runs done, "
                   f"{len(swept.failed)} failed; results in {swept.folder}"))
-    return SOME_FAILED if swept.failed else 0
+    return 3 if swept.failed else 0  # as the help says

@@ -197,7 +197,8 @@ class Throats:
         """(n,) mg/L in the aggregates that take up (n,) um2 mg/L/h of acceptor (0) or donor (1)."""
         supply, inflow = self.supplies[substrate], self._inflows[substrate]
         diffusivity = self.law.diffusivities[substrate]
-        sherwood, power, plug, plug_power = self._transport
+        before, after = (np.array(kind)[:, None] for kind in self.law.transports)
+        sherwood, power, plug, plug_power = np.where(is_plug(self.share), after, before)
         unmixed = plug * self.inflow * self.share**plug_power / diffusivity  # P
         used = np.divide(consumed, inflow, out=np.zeros_like(consumed), where=supply > 0)
         used = np.clip(used, 1e-12, 1 - 1e-12)
@@ -209,12 +210,6 @@ class Throats:
     def _inflows(self) -> np.ndarray:
         """(2, n) inflow of both substrates, um2 mg/L/h."""
         return self.inflow * self.supplies
-
-    @cached_property
-    def _transport(self) -> np.ndarray:
-        """(4, n) the constants of each aggregate."""
-        before, after = (np.array(kind)[:, None] for kind in self.law.transports)
-        return np.where(is_plug(self.share), after, before)
 
 
 def _balance(low: np.ndarray, high: np.ndarray, rate: Callable) -> np.ndarray:

@@ -13,20 +13,16 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from time import perf_counter
-from typing import TypeAlias
 
 from repro.errors import RunEnd
 from repro.march.simulation import rows_within
 from repro.march.simulation import steps as iterate_steps
-from repro.march.state import Report, RestartState
+from repro.march.state import Report
 from repro.march.step_control import SHORTEST, exceeds_tolerance
 from repro.polling import poll
 from repro.preflight.memory import MB, expected_bytes
 from repro.preflight.outlook import MOST_NODES, CoarseRun
 from repro.scene import Scene
-
-#: The state after a step and, if the step is reported, its row.
-ReportedStep: TypeAlias = tuple[RestartState, Report | None]
 
 #: Length of the trial over growth.time_step. Its first step is slow; the fastest one counts.
 FIRST_STEPS = 3
@@ -34,7 +30,6 @@ MOST_STEPS = 9  # of the trial, if its steps are shorter
 #: The trial replaces a mesh of more than MOST_NODES by a coarser one. Time grows with the nodes to
 #: this power.
 POWER = 1.2
-COARSER = 0.9
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,7 @@ def run_trial(scene: Scene, nodes: int, advance: bool = True) -> Trial:
     advance: make steps? Raises SimulationError if a stage fails.
     """
     if nodes > MOST_NODES:
-        size = scene.numerics.refinement * COARSER * math.sqrt(MOST_NODES / nodes)
+        size = scene.numerics.refinement * math.sqrt(MOST_NODES / nodes)
         scene = replace(scene, numerics=replace(scene.numerics, refinement=size))
     if scene.growth:
         end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step) if advance else 0.0

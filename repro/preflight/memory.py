@@ -50,7 +50,6 @@ WARNED = 0.5
 #: Factors of a refinement that are tried for a run that does not fit. Coarser meshes resolve
 #: little.
 COARSER = (0.7, 0.5, 0.35, 0.25)
-HEXAGON = math.sqrt(3) / 2
 MB = 1e6
 
 
@@ -104,11 +103,12 @@ def _nodes(scene: Scene, extent: float, surface: list[tuple[float, float]]) -> f
     largest = pore.width / ACROSS_PORE / resolution(scene)
     if numerics.gradation == 0:
         largest = min([largest, *(size for size, _ in surface)])
-    corners = length * pore.width / (HEXAGON * largest**2) + 2 * (length + pore.width) / largest
+    hexagon = math.sqrt(3) / 2  # the area of a node, over h^2
+    corners = length * pore.width / (hexagon * largest**2) + 2 * (length + pore.width) / largest
     for near, piece in surface:  # smaller elements on both sides of the surface
         if near < largest:
             thickness = (largest - near) / numerics.gradation
-            corners += 2 * piece / HEXAGON * ((1 / near - 1 / largest) / numerics.gradation
+            corners += 2 * piece / hexagon * ((1 / near - 1 / largest) / numerics.gradation
                                               - thickness / largest**2)
     return float(corners) * numerics.scheme.order**2
 

@@ -3,26 +3,16 @@
 from collections.abc import Iterator
 
 from repro.march.simulation import row_times
+from repro.results.quantities import UNITS
 from repro.scene import Aggregate, Scene, scene_tables
 from repro.scene.time_table import TimeTable
-
-LEFT_OUT = {
-    "aggregate": "no aggregate: a clean channel",
-    "flow": "no flow: pure diffusion",
-    "substrates": "no substrates: no transport is assembled",
-    "kinetics": "no uptake, which needs substrates and an aggregate",
-    "growth": "no growth: only the state at t = 0",
-}
 
 
 def describe_model(scene: Scene) -> list[tuple[str, str]]:
     """(section, description) in the order of the scene, including absent sections."""
-    words = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
-             "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
-    absent = {name for name in LEFT_OUT.keys() - {"aggregate"} if getattr(scene, name) is None}
-    absent |= set() if scene.aggregates else {"aggregate"}
-    return [(name, LEFT_OUT[name] if name in absent else "; ".join(describe(scene)))
-            for name, describe in words.items()]
+    sections = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
+                "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
+    return [(name, "; ".join(describe(scene))) for name, describe in sections.items()]
 
 
 def _pore(scene: Scene) -> Iterator[str]:
@@ -38,6 +28,8 @@ def _pore(scene: Scene) -> Iterator[str]:
 
 
 def _aggregate(scene: Scene) -> Iterator[str]:
+    if not scene.aggregates:
+        yield "no aggregate: a clean channel"
     several = len(scene.aggregates) > 1
     for label, seed in zip(scene.labels, scene.aggregates):
         yield f"{label}: {_seed(seed)}" if several else _seed(seed)
@@ -58,14 +50,17 @@ def _seed(seed: Aggregate) -> str:
 
 def _flow(scene: Scene) -> Iterator[str]:
     flow = scene.flow
+    if flow is None:
+        yield "no flow: pure diffusion"
+        return
     yield "Stokes flow (1)-(6)"
     if flow.rate is not None:
-        rate = _over_time(flow.rate, 1e-9 / 60, "uL/min")
+        rate = _over_time(flow.rate, "_uL_per_min")
         yield f"driven by {rate} through a depth of {scene.pore.depth:g} um"
     elif flow.head is None:
-        yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, 24e-6, 'm/day')}"
+        yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, '_m_per_d')}"
     else:
-        yield f"driven by a head of {_over_time(flow.head, 1e-4, 'cm')} over the whole pore"
+        yield f"driven by a head of {_over_time(flow.head, '_cm')} over the whole pore"
     if scene.aggregates:
         yield (f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
                if flow.permeability is None else "an aggregate with a permeability of "
@@ -75,8 +70,11 @@ def _flow(scene: Scene) -> Iterator[str]:
 
 
 def _substrates(scene: Scene) -> Iterator[str]:
+    if scene.substrates is None:
+        yield "no substrates: no transport is assembled"
+        return
     carried = "advection and diffusion" if scene.flow else "diffusion"
-    supplies = {name: f"{name} ({_over_time(kind.supply, 1.0, 'mg/L')})"
+    supplies = {name: f"{name} ({_over_time(kind.supply, '_mg_per_L')})"
                 for name, kind in scene.substrates.modelled.items()}
     yield f"{carried} of {' and '.join(supplies.values())}, {_equations(scene)}"
     if len(supplies) == 1:
@@ -95,12 +93,12 @@ def _substrates(scene: Scene) -> Iterator[str]:
 
 
 def _equations(scene: Scene) -> str:
-    numbers = {"acceptor": "(7)", "donor": "(8)"}
-    return "-".join(numbers[name] for name in scene.substrates.modelled)
+    return "-".join({"acceptor": "(7)", "donor": "(8)"}[name] for name in scene.substrates.modelled)
 
 
-def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
-    """A value in a unit, or the range of its table."""
+def _over_time(value: float | TimeTable, ending: str) -> str:
+    """A value in the unit with this ending of names, or the range of its table."""
+    unit, factor = UNITS[ending].symbol, UNITS[ending].factor
     if not isinstance(value, TimeTable):
         return f"{factor * value:.4g} {unit}"
     least = factor * min(value.values)
@@ -110,6 +108,9 @@ def _over_time(value: float | TimeTable, factor: float, unit: str) -> str:
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:
+    if scene.kinetics is None:
+        yield "no uptake, which needs substrates and an aggregate"
+        return
     law = scene.kinetics.law
     alone = len(scene.substrates.modelled) == 1
     name = law.removeprefix("dual ") if alone else law
@@ -126,6 +127,9 @@ def _kinetics(scene: Scene) -> Iterator[str]:
 
 def _growth(scene: Scene) -> Iterator[str]:
     growth = scene.growth
+    if growth is None:
+        yield "no growth: only the state at t = 0"
+        return
     limit = f" with J_m = {growth.limiting_invariant:g}" if growth.energy == "Gent" else ""
     yield (f"to {growth.end:g} h: an incompressible {growth.energy} body{limit} that expands with "
            "its biomass, (14)-(29)")

@@ -18,14 +18,13 @@ from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
 from repro.model.meshing import MOST_REFINED, resolution
 from repro.polling import OutOfTime, poll, within
+from repro.preflight import LIMIT_OF_BOTH
 from repro.preflight.checked import WIDTH
 from repro.preflight.memory import require_memory, require_outline
 from repro.results import names
 from repro.scene import FINER, PRESETS, Scene, SceneError, Source, label, load_scene
 from repro.scene.arguments import Overrides, typed
 
-#: Processor time (s) of both runs together. Base to 19.4 h needs 5 s in fast, 52 s in paper.
-LIMIT = 120.0
 #: Divides the elements of a scene without a finer preset. It has FACTOR^2 times the nodes.
 FACTOR = 1.5
 #: What a finer key of [numerics] is multiplied by. The error of a midpoint step of length h, which
@@ -100,7 +99,7 @@ class FinerComparison:
 
 @typed
 def error(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
-          limit: float = LIMIT) -> FinerComparison:
+          limit: float = LIMIT_OF_BOTH) -> FinerComparison:
     """Compare a run of a scene with a finer run, to see whether its mesh is fine enough.
 
     Parameters

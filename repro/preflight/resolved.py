@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import count
 
 from repro.errors import StageError
 from repro.model import solving
@@ -14,8 +15,7 @@ from repro.scene import Scene, at_time
 #: The head loss of a resolved flow changes by at most this share on a mesh twice as fine. Near
 #: unresolved corners the error falls with the first power of the size, and is twice the change.
 CHANGE = 0.005
-#: The meshes are two, four and eight times as fine, with at most this many nodes.
-DOUBLINGS = 3
+#: Each mesh is twice as fine as the one before, with at most this many nodes.
 MOST_COMPARED = 30_000
 
 
@@ -31,7 +31,7 @@ def find_unresolved_flow(scene: Scene) -> Iterator[Caveat]:
     drive = at_time(scene.flow, 0.0)
     refinements, losses = [], []
     converged = False
-    for doubling in range(DOUBLINGS + 1):
+    for doubling in count():
         refinement = 2**doubling * scene.numerics.refinement
         finer = replace(scene, numerics=replace(scene.numerics, refinement=refinement))
         if refinement > MOST_REFINED or first_nodes(finer) > MOST_COMPARED:

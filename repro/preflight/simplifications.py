@@ -27,6 +27,8 @@ from repro.scene.keys import RATIO
 
 #: The numbers of a scene by their names.
 Numbers = dict[str, Number]
+#: Finds warnings of a scene, its numbers and the sizes of its aggregates.
+Check = Callable[[Scene, Numbers, Sizes], Iterator["Caveat"]]
 
 #: (1) neglects inertia, whose ratio to the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
@@ -78,7 +80,7 @@ def _apply(scene: Scene, velocity: float | None, end: Sizes | None) -> list[list
     largest, computed = numbers.evaluate_at_largest(scene, velocity, end)
     by_name = {number.name: number for number in computed}
     sizes = end or numbers.at_start(largest)
-    return [list(find(largest, by_name, sizes)) for find, parts in CHECKS.items()
+    return [list(find(largest, by_name, sizes)) for find, parts in CHECKS
             if all(_has(scene, part) for part in parts)]
 
 
@@ -90,6 +92,21 @@ def _has(scene: Scene, part: str) -> bool:
     return section not in (None, ())
 
 
+#: Each check and the parts of a scene that it needs.
+CHECKS: list[tuple[Check, tuple[str, ...]]] = []
+
+
+def _check(*parts: str) -> Callable[[Check], Check]:
+    """Add a function to the checks; parts: that it needs. No warning mentions a part that is left
+    out."""
+    def add(find: Check) -> Check:
+        CHECKS.append((find, parts))
+        return find
+
+    return add
+
+
+@_check("flow")
 def _inertia(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     reynolds = computed["Reynolds"].start
     if reynolds > REYNOLDS:
@@ -98,6 +115,7 @@ def _inertia(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
                      "viscous forces")
 
 
+@_check("flow", "substrates")
 def _cells(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     cell = computed["cell Peclet"].start
     if not scene.numerics.scheme.follows_layers and cell > CELL_PECLET:
@@ -108,6 +126,7 @@ def _cells(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
                      "themselves")
 
 
+@_check("aggregates", "substrates")
 def _diffusivities(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn if only one of two related values of Table 1 is changed."""
     for name, substrate in scene.substrates.modelled.items():
@@ -120,73 +139,62 @@ def _diffusivities(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Ca
                          'the changed diffusivity in water; "80 %" keeps their ratio (2.2)')
 
 
-def _demand(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    """Warn if Y or d_c is changed but F = COD - Y d_c is not; F occurs in (7) alone."""
-    law = scene.kinetics
-    table = Kinetics()
-    product = law.yield_coefficient * law.decay_oxygen_demand
-    table_product = table.yield_coefficient * table.decay_oxygen_demand
-    is_changed = law.donor_oxygen_demand is None and product != table_product
-    if is_changed and law.acceptor_to_donor_ratio == table.acceptor_to_donor_ratio:
-        yield Caveat("kinetics.acceptor_to_donor_ratio", f"F still has the value of Table 1, "
-                     f"{RATIO:g}, but Y d_c has changed from {table_product:.3g} to {product:.3g}, "
-                     "and F = COD - Y d_c (7); replace F by donor_oxygen_demand (COD), from which "
-                     "it is computed")
+@_check("aggregates", "flow")
+def _seed_film(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    _, opposite = walls_of(scene)
+    gap = (scene.pore.width - numbers.at_start(scene).thickness) / opposite.part
+    share = min(1.0, gap / film(scene))
+    nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.scheme.order
+    if nodes < ACROSS_FILM:
+        place, seed = max(zip(scene.aggregate_keys, scene.aggregates),
+                          key=lambda each: each[1].height(scene.pore.width))
+        key = f"{place}.radius" if seed.outline is None else f"{place}.outline"
+        yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "
+                     f"{nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its flow "
+                     "depends on the mesh, whose elements are sized for films of at least "
+                     f"{film(scene):g} um (2.3.3)")
 
 
-def _lag(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    lag = computed["transport over growth time"].start
-    if lag > LAG and not transport_in_time(scene.numerics.transport).stores:
-        permeable = _has(scene, "flow.permeability")
-        remedy = '; "gear" with numerics.preset = "paper" integrates them in time'
-        yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
-                     f"above {LAG:g}: quasi-steady substrates err by about this fraction"
-                     f"{'' if permeable else remedy}")
-
-
-def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    transit = computed.get("transit over growth time")  # not of water that stands still
-    if transit and transit.start > LAG:
-        yield Caveat("flow", f"water takes {transit.start:.2g} of the time of growth to pass the "
-                     f"pore, above {LAG:g}: steady profiles in each shape (3.3.2) ignore the "
-                     "substrates that the pore contained before, so the biomass may err by this "
-                     "fraction")
-
-
-def _forces(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    stress = computed["fluid stress over modulus"]
-    strain = max(stress.start, stress.end or 0.0)
-    if not scene.growth.has_fluid_forces and strain > ACCEPTED:
-        stressed = scene.growth.new_biomass == "stressed"
-        setting = '"included"' + ("" if stressed else ' with growth.new_biomass = "stressed"')
-        yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
-                     f"above {ACCEPTED:g}: it strains the aggregate by about this fraction, and "
-                     f"the scene neglects it (2.3.3); {setting} models it")
-
-
-def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    """Warn if the forces of the flow do not count against a strength."""
-    for key in ("bonding_strength", "tensile_strength"):
-        is_set = getattr(scene.growth, key) is not None
-        if is_set and not scene.growth.has_fluid_forces:
-            yield Caveat(f"growth.{key}", "the flow cannot exceed it, since the scene neglects the "
-                         "fluid's forces, and only the stress of growth counts; "
-                         'growth.fluid_forces = "included" adds the forces')
-
-
-def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    """Warn if the shape depends on how a wall bears the water's force on a sliding aggregate."""
-    if scene.growth.bonded or not scene.growth.has_fluid_forces:
+@_check("aggregates")
+def _ends(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn if the conditions at the pore's ends, of flow or of substrates, are too near."""
+    if not (scene.flow or scene.substrates):
         return
-    stress = computed["fluid stress over modulus"]
-    force = DRAG * stress.start + (stress.end or 0.0)
-    if force > ACCEPTED:
-        yield Caveat("growth.wall", f"the water's force reaches {force:.2g} of mu_L times the "
-                     f"aggregate's thickness, above {ACCEPTED:g}: a sliding aggregate is kept in "
-                     "place by a traction of an assumed distribution, and its shape depends "
-                     'on it by about this fraction; growth.wall = "bonded" computes the traction')
+    for reached in (numbers.at_start(scene), sizes):
+        free = min(10 * reached.thickness, 1.5 * scene.pore.whole_width)
+        if reached.reach + free > scene.pore.length / 2:
+            when = f"at t = {reached.time:.3g} h" if reached.time else "from the start"
+            stops = ", and the run ends if the aggregate reaches one of them"
+            yield Caveat("pore.length", f"the aggregate is within {free:.3g} um of the pore's ends "
+                         f"{when} (reach {reached.reach:.3g} of {scene.pore.length / 2:g} um): the "
+                         "conditions at the ends (3.1) are then too near"
+                         + (stops if scene.growth else ""))
+            return
 
 
+@_check("aggregates", "flow.permeability")
+def _drag_layer(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn if elements widen the layer in which a permeable aggregate slows the water.
+
+    The water slips on this layer: the flow through a film of thickness h beside a layer l is at
+    most 1 + 3 l / h times that beside a wall.
+    """
+    permeability = scene.flow.permeability
+    root = math.sqrt(permeability)
+    size = _interface_size(scene, sizes.thickness)
+    thickness = size / ACROSS
+    gap = max(scene.pore.width - sizes.thickness, least_gap(scene))
+    loss = 3 * (root - permeability / thickness) / gap
+    if loss > ACCEPTED:
+        accepted = root / (1 - ACCEPTED * gap / (3 * root))
+        yield Caveat("flow.permeability", f"the flow fades in the aggregate over the root of "
+                     f"the permeability, {root:.2g} um, which elements of {size:.2g} um widen to "
+                     f"{thickness:.2g} um: the flow through the narrowest film, {gap:.2g} um, may "
+                     f"be {100 * loss:.2g} % too small" + _resolving(resolution(scene) * thickness
+                                                             / accepted))
+
+
+@_check("kinetics")
 def _fronts(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
     """Warn of layers thinner than elements, and of fronts of zero order that elements widen: see
     :meth:`RateLaw.on`."""
@@ -211,31 +219,92 @@ def _fronts(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
                          "in its solution)" + _resolving(resolution(scene) * nodes / layer))
 
 
+@_check("kinetics", "substrates.acceptor")
+def _demand(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn if Y or d_c is changed but F = COD - Y d_c is not; F occurs in (7) alone."""
+    law = scene.kinetics
+    table = Kinetics()
+    product = law.yield_coefficient * law.decay_oxygen_demand
+    table_product = table.yield_coefficient * table.decay_oxygen_demand
+    is_changed = law.donor_oxygen_demand is None and product != table_product
+    if is_changed and law.acceptor_to_donor_ratio == table.acceptor_to_donor_ratio:
+        yield Caveat("kinetics.acceptor_to_donor_ratio", f"F still has the value of Table 1, "
+                     f"{RATIO:g}, but Y d_c has changed from {table_product:.3g} to {product:.3g}, "
+                     "and F = COD - Y d_c (7); replace F by donor_oxygen_demand (COD), from which "
+                     "it is computed")
+
+
+@_check("growth")
+def _lag(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    lag = computed["transport over growth time"].start
+    if lag > LAG and not transport_in_time(scene.numerics.transport).stores:
+        permeable = _has(scene, "flow.permeability")
+        remedy = '; "gear" with numerics.preset = "paper" integrates them in time'
+        yield Caveat("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
+                     f"above {LAG:g}: quasi-steady substrates err by about this fraction"
+                     f"{'' if permeable else remedy}")
+
+
+@_check("growth", "flow")
+def _transit(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    transit = computed.get("transit over growth time")  # not of water that stands still
+    if transit and transit.start > LAG:
+        yield Caveat("flow", f"water takes {transit.start:.2g} of the time of growth to pass the "
+                     f"pore, above {LAG:g}: steady profiles in each shape (3.3.2) ignore the "
+                     "substrates that the pore contained before, so the biomass may err by this "
+                     "fraction")
+
+
+@_check("growth", "flow")
+def _forces(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    stress = computed["fluid stress over modulus"]
+    strain = max(stress.start, stress.end or 0.0)
+    if not scene.growth.has_fluid_forces and strain > ACCEPTED:
+        stressed = scene.growth.new_biomass == "stressed"
+        setting = '"included"' + ("" if stressed else ' with growth.new_biomass = "stressed"')
+        yield Caveat("growth.fluid_forces", f"the fluid's stress reaches {strain:.2g} of mu_L, "
+                     f"above {ACCEPTED:g}: it strains the aggregate by about this fraction, and "
+                     f"the scene neglects it (2.3.3); {setting} models it")
+
+
+@_check("growth", "flow")
+def _strengths(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn if the forces of the flow do not count against a strength."""
+    for key in ("bonding_strength", "tensile_strength"):
+        is_set = getattr(scene.growth, key) is not None
+        if is_set and not scene.growth.has_fluid_forces:
+            yield Caveat(f"growth.{key}", "the flow cannot exceed it, since the scene neglects the "
+                         "fluid's forces, and only the stress of growth counts; "
+                         'growth.fluid_forces = "included" adds the forces')
+
+
+@_check("growth", "flow")
+def _support(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    """Warn if the shape depends on how a wall bears the water's force on a sliding aggregate."""
+    if scene.growth.bonded or not scene.growth.has_fluid_forces:
+        return
+    stress = computed["fluid stress over modulus"]
+    force = DRAG * stress.start + (stress.end or 0.0)
+    if force > ACCEPTED:
+        yield Caveat("growth.wall", f"the water's force reaches {force:.2g} of mu_L times the "
+                     f"aggregate's thickness, above {ACCEPTED:g}: a sliding aggregate is kept in "
+                     "place by a traction of an assumed distribution, and its shape depends "
+                     'on it by about this fraction; growth.wall = "bonded" computes the traction')
+
+
+@_check("growth")
+def _steps(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
+    grown = numbers.fastest_growth(scene) * scene.growth.time_step
+    if not scene.numerics.scheme.controls_error and grown > GROWTH_IN_A_STEP:
+        yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
+                     f"update, above {100 * GROWTH_IN_A_STEP:g} %: an update uses the "
+                     'rates at its start; choose a shorter one, or numerics.preset = "fast"')
+
+
 def _interface_size(scene: Scene, thickness: float) -> float:
     """The size (um) of elements at the interface of an aggregate of a thickness (um)."""
     size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
     return size / resolution(scene)
-
-
-def _drag_layer(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    """Warn if elements widen the layer in which a permeable aggregate slows the water.
-
-    The water slips on this layer: the flow through a film of thickness h beside a layer l is at
-    most 1 + 3 l / h times that beside a wall.
-    """
-    permeability = scene.flow.permeability
-    root = math.sqrt(permeability)
-    size = _interface_size(scene, sizes.thickness)
-    thickness = size / ACROSS
-    gap = max(scene.pore.width - sizes.thickness, least_gap(scene))
-    loss = 3 * (root - permeability / thickness) / gap
-    if loss > ACCEPTED:
-        accepted = root / (1 - ACCEPTED * gap / (3 * root))
-        yield Caveat("flow.permeability", f"the flow fades in the aggregate over the root of "
-                     f"the permeability, {root:.2g} um, which elements of {size:.2g} um widen to "
-                     f"{thickness:.2g} um: the flow through the narrowest film, {gap:.2g} um, may "
-                     f"be {100 * loss:.2g} % too small" + _resolving(resolution(scene) * thickness
-                                                             / accepted))
 
 
 def _resolving(refinement: float) -> str:
@@ -245,45 +314,6 @@ def _resolving(refinement: float) -> str:
     if sufficient <= MOST_REFINED:
         return f"; numerics.refinement = {sufficient:.3g} would resolve it"
     return f"; no refinement up to {MOST_REFINED:g} resolves it"
-
-
-def _seed_film(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    _, opposite = walls_of(scene)
-    gap = (scene.pore.width - numbers.at_start(scene).thickness) / opposite.part
-    share = min(1.0, gap / film(scene))
-    nodes = sizing.ACROSS_FILM * scene.numerics.refinement * share * scene.numerics.scheme.order
-    if nodes < ACROSS_FILM:
-        place, seed = max(zip(scene.aggregate_keys, scene.aggregates),
-                          key=lambda each: each[1].height(scene.pore.width))
-        key = f"{place}.radius" if seed.outline is None else f"{place}.outline"
-        yield Caveat(key, f"the film over the seed, {gap:.2g} um, spans only "
-                     f"{nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its flow "
-                     "depends on the mesh, whose elements are sized for films of at least "
-                     f"{film(scene):g} um (2.3.3)")
-
-
-def _ends(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    """Warn if the conditions at the pore's ends, of flow or of substrates, are too near."""
-    if not (scene.flow or scene.substrates):
-        return
-    for reached in (numbers.at_start(scene), sizes):
-        free = min(10 * reached.thickness, 1.5 * scene.pore.whole_width)
-        if reached.reach + free > scene.pore.length / 2:
-            when = f"at t = {reached.time:.3g} h" if reached.time else "from the start"
-            stops = ", and the run ends if the aggregate reaches one of them"
-            yield Caveat("pore.length", f"the aggregate is within {free:.3g} um of the pore's ends "
-                         f"{when} (reach {reached.reach:.3g} of {scene.pore.length / 2:g} um): the "
-                         "conditions at the ends (3.1) are then too near"
-                         + (stops if scene.growth else ""))
-            return
-
-
-def _steps(scene: Scene, computed: Numbers, sizes: Sizes) -> Iterator[Caveat]:
-    grown = numbers.fastest_growth(scene) * scene.growth.time_step
-    if not scene.numerics.scheme.controls_error and grown > GROWTH_IN_A_STEP:
-        yield Caveat("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
-                     f"update, above {100 * GROWTH_IN_A_STEP:g} %: an update uses the "
-                     'rates at its start; choose a shorter one, or numerics.preset = "fast"')
 
 
 def warn_missed_tolerance(scene: Scene, worst: float, count: str = "") -> Iterator[Caveat]:
@@ -325,22 +355,3 @@ def warn_surface(pore: Pore) -> Iterator[Caveat]:
                  f"{crease.least:.3f}, below {limit:g}: a crease there would lower the energy, "
                  "and only a surface without flaws stays smooth; "
                  '"stress_free" avoids this')
-
-
-#: Each check and the parts of a scene that it needs: a warning mentions no part that is left out.
-CHECKS: dict[Callable[[Scene, Numbers, Sizes], Iterator[Caveat]], tuple[str, ...]] = {
-    _inertia: ("flow",),
-    _cells: ("flow", "substrates"),
-    _diffusivities: ("aggregates", "substrates"),
-    _seed_film: ("aggregates", "flow"),
-    _ends: ("aggregates",),
-    _drag_layer: ("aggregates", "flow.permeability"),
-    _fronts: ("kinetics",),
-    _demand: ("kinetics", "substrates.acceptor"),
-    _lag: ("growth",),
-    _transit: ("growth", "flow"),
-    _forces: ("growth", "flow"),
-    _strengths: ("growth", "flow"),
-    _support: ("growth", "flow"),
-    _steps: ("growth",),
-}

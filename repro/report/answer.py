@@ -13,16 +13,22 @@ from repro.results.outlines import boundary
 
 #: Rows of the table, and outlines in the picture, without a row for the contact.
 SEVERAL = 5
-#: A relative change that the sentence does not name.
-UNCHANGED = 1e-3
 WIDTH = 640  # of the picture
 MARGIN = 8
+
+
 def build(run: Run) -> str:
     """Sentence, table and picture; a sentence alone of a run without rows."""
     if not len(run.times):
         return "<p>The run has no row: it stopped before the first.</p>"
     table = page.table("", ["t (h)", *map(names.with_unit, _columns(run))], _rows(run))
-    return f'<p class="answer">{escape(sentence(run))}</p>{table}{_picture(run)}'
+    picture = ""
+    if entries := fields.index(run.folder) if "aggregate" in run.record["tables"] else []:
+        evenly = np.linspace(0, len(entries) - 1, SEVERAL).round().astype(int)
+        chosen = [entries[k] for k in np.unique(evenly)]
+        picture = outlines([time for time, _ in chosen],
+                           [field_files.read(path) for _, path in chosen])
+    return f'<p class="answer">{escape(sentence(run))}</p>{table}{picture}'
 
 
 def sentence(run: Run) -> str:
@@ -57,7 +63,7 @@ def _change(noun: str, name: str, run: Run) -> str:
     """The first and the last value of a column, and the factor between those of the pore."""
     values = run.series[name]
     first, last = values[np.isfinite(values)][[0, -1]]
-    if abs(last - first) <= UNCHANGED * abs(first):
+    if _short(first) == _short(last):
         stays = "stays at" if len(values) > 1 else "is"
         return f"The {noun} {stays} {_short(first)} {names.unit(name)}."
     verb = "falls" if last < first else "rises"
@@ -82,16 +88,6 @@ def _rows(run: Run) -> list[list[str]]:
              *quantities.contact(run)}
     return [[f"{time:.6g}", *(_short(run.series[name][run.times == time][-1])
                               for name in _columns(run))] for time in sorted(times)]
-
-
-def _picture(run: Run) -> str:
-    """The outlines of the aggregates at several times; empty without fields of an aggregate."""
-    entries = fields.index(run.folder) if "aggregate" in run.record["tables"] else []
-    if not entries:
-        return ""
-    evenly = np.linspace(0, len(entries) - 1, SEVERAL).round().astype(int)
-    chosen = [entries[k] for k in np.unique(evenly)]
-    return outlines([time for time, _ in chosen], [field_files.read(path) for _, path in chosen])
 
 
 def outlines(times: list[float], grids: list[Grid]) -> str:

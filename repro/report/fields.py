@@ -23,8 +23,6 @@ from repro.results.files import MOST_TABLE, read
 MOST_FRAMES = 40
 MOST_BYTES = 2_600_000  # of all frames and charts in the page; two frames are always shown
 MOST_NODES = 10_000  # of a frame; a finer mesh is shown on a regular grid of so many points
-#: The note on a frame of the grown aggregate before it expands (Plate 1).
-BEFORE = "before the expansion"
 LEVELS = 65534  # of a value; one more for no value
 #: The fields that a reader can choose, in this order.
 FIELDS = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
@@ -100,7 +98,7 @@ def _chosen(entries: list[tuple[float, Path]], before: dict[float, Path], grid: 
     frames: list[tuple[float, Path, str]] = []
     for time, path in (entries[k] for k in np.unique(evenly)):
         if time in before and 2 * count <= room:
-            frames.append((time, before[time], BEFORE))
+            frames.append((time, before[time], "before the expansion"))  # Plate 1
         frames.append((time, path, ""))
     return frames
 

@@ -15,9 +15,6 @@ from repro.scene import SceneError
 OWN_PLACE = {"scene", "hash", "sha256", "tables", "versions", "status", "rows", "wall_time_s",
         "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
-#: Colours of a field. Neighbours cannot be told apart.
-BANDS = 128
-
 CONTROLS = """<div class="controls"><label>Field <select id="field"></select></label>
 <label><input type="checkbox" id="lines"> mesh</label>
 <label{aggregate}><input type="checkbox" id="outline" checked> outline of the aggregate</label>
@@ -42,7 +39,8 @@ def build(run: Run) -> str:
     more = ""
     if packed:
         start = _first_shown(packed, quantities.contact(run))
-        more = page.data("fields", packed | {"start": start, "colours": viridis(BANDS)})
+        colours = viridis(128)  # neighbours look alike
+        more = page.data("fields", packed | {"start": start, "colours": colours})
     tables = run.record["tables"]
     scene = "".join(page.table(f"[{name}]", [], _pairs(part)) for name, part in tables.items())
     if scene:
@@ -107,9 +105,9 @@ def _field_note(packed: dict) -> str:
     in_bodies = any(field["body"] for field in packed["fields"])
     fluid = ", and the fluid where a field exists in the aggregate alone" if in_bodies else ""
     slider = " Arrow keys also move the slider." if total > 1 else ""
-    return (f"{note}; {times}{besides}. Values are rounded to 1/65534 of their range; the .vtu "
-            "files have every time and digit. Colours span the values that are shown, on a "
-            "logarithmic scale from a factor of 100 on, over four decades at most. Grey is the "
+    return (f"{note}; {times}{besides}. Values are rounded to 1/{fields.LEVELS} of their range; "
+            "the .vtu files have every time and digit. Colours span the values that are shown, on "
+            "a logarithmic scale from a factor of 100 on, over four decades at most. Grey is the "
             f"part of the pore that is not meshed at that time{fluid}. Point at the picture for a "
             f"value, or focus it and press the arrow keys.{slider}")
 

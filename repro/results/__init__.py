@@ -40,7 +40,6 @@ from repro.scene import Scene, scene_hash, scene_tables
 
 #: Factor from um/h to m/d.
 M_PER_D = UNITS["_m_per_d"].factor
-PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -94,7 +93,8 @@ def provenance(scene: Scene) -> dict:
     """
     versions = {"dupin2001-repro": version("dupin2001-repro"),
                 "python": platform.python_version()}
-    versions |= {name: version(name) for name in PACKAGES}
+    packages = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
+    versions |= {name: version(name) for name in packages}
     exchanged = scene.numerics.exchanged
     scheme = {} if exchanged is None else {"scheme": asdict(exchanged)}
     return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),

@@ -10,7 +10,7 @@ from repro.model.pore import Pore
 from repro.model.solving import Solved
 from repro.model.surface import STRETCH, surfaces
 from repro.results.field_files import Grid
-from repro.results.quantities import Quantity, is_modelled
+from repro.results.quantities import Quantity, is_modelled, is_solved
 from repro.scene import Scene
 
 
@@ -55,16 +55,12 @@ class State:
         return (value * dx).sum(axis=1) / dx.sum(axis=1)
 
 
-def _has(name: str, state: State) -> bool:
-    return getattr(state.solved.concentrations, name, None) is not None
-
-
 ORIGIN = "positions at t = 0"
 #: Parts that an array may need: does a state have them?
 NEEDS: dict[str, Callable[[State], bool]] = {
     "flow": lambda state: state.solved.flow is not None,
-    "acceptor": lambda state: _has("acceptor", state),
-    "donor": lambda state: _has("donor", state),
+    "acceptor": lambda state: is_solved(state.solved, "acceptor"),
+    "donor": lambda state: is_solved(state.solved, "donor"),
     "biomass": lambda state: state.scene.kinetics is not None,
     "growth": lambda state: state.scene.growth is not None and bool(state.pore.bodies),
     ORIGIN: lambda state: (NEEDS["growth"](state) and state.scene.growth.erosion is None
@@ -163,7 +159,6 @@ def _stress(k: int, state: State) -> np.ndarray:
 
 
 _FITTED = "of the points where growth is integrated, fitted linearly in each triangle"
-_CAUCHY = "of mu_L (J^(-5/3) (F F^T - tr C / 3) + P / mu_L), the mean over the triangle at t = 0"
 
 ARRAYS = (
     Array("velocity_m_per_d", "velocity", "u (1)-(5)",
@@ -195,7 +190,8 @@ ARRAYS = (
     Array("surface_stretch", "elastic stretch along the free surface",
           f"{STRETCH}; in the triangles at the free surface, of two edges the lesser", _stretch,
           needs="growth", cells=True, body=True),
-    *(Array(f"stress_{axes}_MPa", f"stress {axes}", f"Cauchy stress {axes}, {_CAUCHY}",
+    *(Array(f"stress_{axes}_MPa", f"stress {axes}", f"Cauchy stress {axes}, of mu_L "
+            "(J^(-5/3) (F F^T - tr C / 3) + P / mu_L), the mean over the triangle at t = 0",
             partial(_stress, k), needs="stress", cells=True, body=True, signed=True)
       for k, axes in enumerate(("xx", "yy", "zz", "xy"))),
     Array("largest_principal_stress_MPa", "largest principal stress",

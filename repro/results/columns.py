@@ -12,7 +12,7 @@ from repro.march.state import Report, stopping
 from repro.model.energies.neo_hookean import BIOT, CREASE
 from repro.model.surface import BESIDE, STRETCH, least_stretched, surfaces
 from repro.model.transport_in_time import transport_in_time
-from repro.results.quantities import Quantity, is_modelled
+from repro.results.quantities import Quantity, is_modelled, is_solved
 from repro.scene import Scene
 
 SUBSTRATES = ("acceptor", "donor")
@@ -20,14 +20,11 @@ SUBSTRATES = ("acceptor", "donor")
 AT_REST = "flow and substrates"
 
 
-def _solved(name: str, scene: Scene, at: Report) -> bool:
-    return getattr(at.solved.concentrations, name, None) is not None
-
-
 #: Parts that a quantity may need: does a report have them?
 NEEDS: dict[str, Callable[[Scene, Report], bool]] = {
     "flow": lambda scene, at: at.solved.flow is not None,
-    **{name: partial(_solved, name) for name in SUBSTRATES},
+    "acceptor": lambda scene, at: is_solved(at.solved, "acceptor"),
+    "donor": lambda scene, at: is_solved(at.solved, "donor"),
     "seed": lambda scene, at: bool(scene.aggregates or at.pore.bodies),
     "aggregate": lambda scene, at: bool(at.pore.bodies),
     "biomass": lambda scene, at: bool(at.pore.bodies) and scene.kinetics is not None,

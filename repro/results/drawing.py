@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from repro.errors import printable
+from repro.errors import printable, shortened
 from repro.results import names, outlines, quantities
 from repro.results.files import output_path
 from repro.results.jumps import with_jumps
@@ -100,7 +100,7 @@ def curves(results: Results, drawn: Sequence[Sequence[str]], ax: Any = None,
     for panel, columns in zip(axes, drawn):
         _draw_panel(panel, results, columns, style)
     axes[-1].set_xlabel("time (h)")
-    axes[0].set_title(_plain(style.title or results.name), loc="left")
+    axes[0].set_title(_plain(style.title or shortened(results.name)), loc="left")
     return axes
 
 
@@ -268,7 +268,7 @@ def against(frame: Any, factors: Sequence[Any], name: str, title: str, ax: Any =
         ax.text(0.5, 0.5, "in no run", transform=ax.transAxes, ha="center")
     if others:
         ax.legend(frameon=False, fontsize="small")
-    ax.set_title(_plain(title), loc="left")
+    ax.set_title(_plain(shortened(title)), loc="left")
     ax.grid(alpha=0.3)
     return ax
 
@@ -302,20 +302,22 @@ def film(results: Results, name: str, file: Path, ax: Any = None, style: Style =
 
 
 def _write_gif(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any) -> Any:
-    """Write frames in the colours of the first one, whose colour bar has all; later ones keep its
-    layout."""
+    """Write frames in one palette, in the layout of the first one.
+
+    The palette covers the colours of about ten frames. By their frequency it would lack most of the
+    colour bar.
+    """
     image = optional("PIL.Image")
-    images: list[Any] = []
-    palette = None
+    pictures: list[Any] = []
     for last in frames(ax):
         content = io.BytesIO()
         last.figure.savefig(content, format="png", dpi=RESOLUTION)
         last.figure.set_layout_engine("none")
-        picture = image.open(content).convert("RGB")
-        palette = palette or picture.quantize()
-        images.append(picture.quantize(palette=palette, dither=0))
-    images[0].save(file, format="GIF", save_all=True, append_images=images[1:], duration=FRAME,
-                   loop=0)
+        pictures.append(image.open(content).convert("RGB"))
+    sample = image.fromarray(np.vstack(pictures[::len(pictures) // 10 + 1]))
+    palette = sample.quantize(method=image.Quantize.MAXCOVERAGE)
+    first, *others = (each.quantize(palette=palette, dither=0) for each in pictures)
+    first.save(file, format="GIF", save_all=True, append_images=others, duration=FRAME, loop=0)
     return last
 
 
@@ -350,7 +352,7 @@ def _frames(results: Results, name: str, style: Style, ax: Any) -> Iterator[Any]
 
 def heading(results: Results, time: float, style: Style = PLAIN) -> str:
     """The title of a picture, by default the name of the scene, and a time (h)."""
-    return f"{style.title or results.name}, t = {time:.4g} h"
+    return f"{style.title or shortened(results.name)}, t = {time:.4g} h"
 
 
 def key_figures(columns: Mapping[str, np.ndarray]) -> str:

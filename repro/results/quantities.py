@@ -5,11 +5,16 @@ denotes a pure number. Formulas give the package's own units (um, h, mg/L, MPa);
 converts them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from math import isnan
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from repro.model.solving import Solved
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,11 @@ def is_modelled(quantity: Quantity, conditions: dict[str, Callable[..., bool]],
     """Return whether all parts are modelled that the quantity needs."""
     needed = quantity.needs.split(" and ") if quantity.needs else []
     return all(conditions[word](*arguments) for word in needed)
+
+
+def is_solved(solved: Solved, substrate: str) -> bool:
+    """Return whether the state has concentrations of a substrate."""
+    return getattr(solved.concentrations, substrate, None) is not None
 
 
 def none_if_nan(value: float) -> float | None:

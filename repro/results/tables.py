@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from repro import results
-from repro.errors import RunEnd, printable
+from repro.errors import RunEnd, printable, shortened
 from repro.march.simulation import report_at, reports, steps
 from repro.march.state import SAME_TIME, Report, RestartState
 from repro.results import drawing, names, outlines, sampling
@@ -24,7 +23,7 @@ from repro.results.quantities import plain as unit
 from repro.scene import Scene, Source, bodies, load_scene, scene_tables
 from repro.scene.arguments import Overrides, typed
 from repro.scene.needed import package
-from repro.scene.units import to_internal
+from repro.scene.units import nearest, to_internal
 from repro.schemes import Scheme
 from repro.timing import progress_bar
 
@@ -431,7 +430,7 @@ class Results(Mapping[str, np.ndarray]):
                 lines += [self.outline(each, int(number)) for number in present if number]
             if not lines:
                 raise KeyError(f"{OUTLINES}: this run has no aggregate at these times")
-            heading, box = title or self.name, drawing.corners(fields)
+            heading, box = title or shortened(self.name), drawing.corners(fields)
             return drawing.drawn_outlines(lines, heading, box, ax, photograph=photograph,
                                           style=style)
         if isinstance(time, Sequence) and not isinstance(time, str):
@@ -709,8 +708,8 @@ def _hours(time: float | str) -> float:
 
 def _unknown(name: str, message: str, known: Iterable[str]) -> KeyError:
     """Return the error of a name that is not known, with the nearest one."""
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return KeyError(f"{name}: {message}{f'; did you mean {near[0]}?' if near else ''}")
+    near = nearest(name, known, cutoff=0.5)
+    return KeyError(f"{name}: {message}{f'; did you mean {near}?' if near else ''}")
 
 
 @typed

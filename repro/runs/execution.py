@@ -36,7 +36,7 @@ from repro.runs.folder import (
     refuse_null,
     remove_temporary,
 )
-from repro.runs.integrity import find_damage
+from repro.runs.integrity import find_damage, require_known_status
 from repro.runs.machine import differences, refuse_exchanged, require_packages
 from repro.runs.recorder import Recorder, complete_folder, interruption
 from repro.runs.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, is_over
@@ -120,6 +120,7 @@ def run(scene: Source, folder: str | Path, watch: Watch = DEFAULT_WATCH, *, forc
         if force:
             refuse_foreign(folder, recorder.run_files)
             return _run_from_start(recorder, watch)
+        require_known_status(folder, record)
         _refuse_another(recorder, record)
         prepare(folder, recorder.run_files)
         return _continue(recorder, record, watch)
@@ -182,6 +183,7 @@ def resume(folder: str | Path, overrides: Collection[str] = (),
         raise OutputError(f"{folder}: there is no run.json; the folder of a run is needed")
     with locked(folder, watch.patience):
         record = read_record(folder)
+        require_known_status(folder, record)
         run_files = list_written_files(folder, record)
         refuse_links(folder, run_files)
         scene = parse_scene(record["tables"], record["scene"], str(file))

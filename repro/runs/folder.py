@@ -29,12 +29,11 @@ CHECKPOINTS = (*STATES, REFUSED)
 #: Every file that a run may write, except its fields.
 RUN_FILES = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,
              REPORT, *CHECKPOINTS, LAST)
-#: A line of SUMS, in the format of sha256sum.
-SUM = re.compile(rf"([0-9a-f]{{64}})  ({FIELDS.pattern})")
-#: A temporary folder of a file that is being written, and the names of files in it.
-TEMPORARY_FOLDER = re.compile(re.escape(WRITING) + r"\w{8}")
-FILE_NAME = re.compile("|".join([FIELDS.pattern.removeprefix("fields/"),
-                                 *map(re.escape, RUN_FILES)]))
+
+
+def is_own(name: str) -> bool:
+    """May a run write a file of this name?"""
+    return name in RUN_FILES or FIELDS.fullmatch(name) is not None
 
 
 def list_written_files(folder: Path, record: dict) -> set[str]:
@@ -46,9 +45,8 @@ def list_written_files(folder: Path, record: dict) -> set[str]:
     if not isinstance(record.get("files"), list):
         raise OutputError(f"{folder}: run.json lists no files of a run; move the folder away, or "
                           "name another")
-    listed = map(str, record["files"])
-    own = (*RUN_FILES, "timeseries.nc")  # which runs of earlier versions have written
-    names = {name for name in listed if name in own or FIELDS.fullmatch(name)}
+    names = {name for name in map(str, record["files"])
+             if is_own(name) or name == "timeseries.nc"}  # runs of earlier versions wrote it
     if SUMS in names and is_file(folder / SUMS):
         names |= read_sums(folder).keys()
     return names | {PROVENANCE, *CHECKPOINTS}
@@ -65,7 +63,9 @@ def read_sums(folder: Path) -> dict[str, str]:
         lines = read(folder / SUMS, MOST_TABLE).decode(errors="replace").splitlines()
     except OSError:
         return {}
-    return {match[2]: match[1] for match in map(SUM.fullmatch, lines) if match}
+    parts = (line.partition("  ") for line in lines)
+    return {name: digest for digest, _, name in parts
+            if re.fullmatch("[0-9a-f]{64}", digest) and FIELDS.fullmatch(name)}
 
 
 def prepare(folder: Path, run_files: Collection[str] = ()) -> None:
@@ -108,7 +108,7 @@ def refuse_foreign(folder: Path, run_files: Collection[str]) -> None:
     """Raise OutputError if a file that no run has written has a name that a run uses."""
     with folder_errors(folder):
         for name in find_foreign(folder, run_files):
-            if name in RUN_FILES or FIELDS.fullmatch(name):
+            if is_own(name):
                 raise OutputError(f"{folder / name}: no run has written it; move it away")
 
 
@@ -125,9 +125,9 @@ def remove_temporary(folder: Path) -> None:
     """Remove the temporary files of a run that was killed, and their folders if then empty."""
     folders = [folder, folder / "fields"] if is_folder(folder / "fields") else [folder]
     for temporary in (path for parent in folders for path in parent.glob(WRITING + "*")):
-        if TEMPORARY_FOLDER.fullmatch(temporary.name) and is_folder(temporary):
+        if re.fullmatch(rf"{re.escape(WRITING)}\w{{8}}", temporary.name) and is_folder(temporary):
             for file in temporary.iterdir():
-                if FILE_NAME.fullmatch(file.name) and is_file(file):
+                if (is_own(file.name) or is_own(f"fields/{file.name}")) and is_file(file):
                     file.unlink()
             with suppress(OSError):  # it contains another file
                 temporary.rmdir()

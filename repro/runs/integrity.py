@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from repro.errors import OutputError
+from repro.errors import OutputError, shortened
 from repro.report.reading import Run, read, read_record, require_columns
 from repro.results.files import is_file, sha256_of
 from repro.runs.folder import REPORT, read_sums
-from repro.runs.status import RUNNING, is_over
+from repro.runs.status import RUNNING, is_known, is_over
 from repro.scene import Scene, scene_hash
 
 
@@ -56,9 +56,19 @@ def find_damage(folder: Path, record: dict) -> str:
     return ""
 
 
+def require_known_status(folder: Path, record: dict) -> None:
+    """Raise OutputError if this version does not know the status of a run: it may be over."""
+    status = record["status"]
+    if not is_known(status):
+        raise OutputError(f"{folder}: run.json has the status {shortened(status)!r}, which this "
+                          "version does not know; use the version that wrote it, or --force, which "
+                          "removes the files of that run")
+
+
 def read_status(folder: Path) -> str:
     """Read the status of the run in a folder. Raises OutputError if its files are damaged."""
     record = read_record(folder)
+    require_known_status(folder, record)
     status = record["status"]
     if status != RUNNING and (damage := find_damage(folder, record)):
         raise OutputError(damage)

@@ -7,13 +7,14 @@ import re
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
 
+from repro.errors import PackageMissing
+from repro.fem.linear import Method
 from repro.scene import Scene, SceneError
 from repro.scene.units import alike
 
@@ -28,8 +29,6 @@ REMARK = re.compile(r"""
     | \"[^"\\\n]*(?:\\.[^"\\\n]*)*\"
     | '[^'\\\n]*(?:\\.[^'\\\n]*)*'
     """, re.VERBOSE | re.DOTALL)
-#: {(key of numerics, choice): the optional package that it needs}
-OPTIONAL = {("solver", "pardiso"): "pypardiso"}
 
 
 def refuse_exchanged(scene: object) -> None:
@@ -41,10 +40,11 @@ def refuse_exchanged(scene: object) -> None:
 
 def require_packages(scene: Scene) -> None:
     """Raise SceneError if a scene needs an optional package that is not installed."""
-    for (key, choice), package in OPTIONAL.items():
-        if getattr(scene.numerics, key) == choice and find_spec(package) is None:
-            raise SceneError(f'{scene.name}: numerics.{key} = "{choice}": the package {package} is '
-                             f"not installed; pip install {package}, or leave the key out")
+    try:
+        Method(scene.numerics.solver).checked()
+    except PackageMissing as error:
+        raise SceneError(f'{scene.name}: numerics.solver = "{scene.numerics.solver}": {error}, or '
+                         "leave the key out") from None
 
 
 @cache
@@ -81,9 +81,8 @@ def conditions() -> dict:
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
     optional = {}
-    for name in OPTIONAL.values():
-        with suppress(PackageNotFoundError):
-            optional[name] = version(name)
+    with suppress(PackageNotFoundError):
+        optional["pypardiso"] = version("pypardiso")
     return {"system": platform.system(), "machine": platform.machine(),
             "libc": " ".join(platform.libc_ver()), "blas": f"{blas['name']} {blas['version']}",
             "simd": built["SIMD Extensions"].get("found", []),

@@ -1,5 +1,7 @@
 """The ``status`` of a run in its ``run.json``."""
 
+import re
+
 COMPLETED = "completed"
 RUNNING = "running"
 INTERRUPTED = "interrupted"
@@ -16,4 +18,11 @@ def is_fold(status: str) -> bool:
 
 def is_over(status: str) -> bool:
     """Has the run reached the end of its scene, or of the model: :class:`repro.errors.RunEnd`?"""
-    return status not in (RUNNING, INTERRUPTED, NOT_RUN) and not status.startswith(FAILED)
+    names_time = re.search(r" t = \S+ h\b", status)  # as the message of every end of the model
+    return status == COMPLETED or bool(names_time) and not status.startswith(FAILED)
+
+
+def is_known(status: str) -> bool:
+    """Is it a status that this version writes?"""
+    return (is_over(status) or status in (RUNNING, INTERRUPTED, NOT_RUN)
+            or status.startswith(FAILED))

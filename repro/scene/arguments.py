@@ -14,8 +14,6 @@ from repro.scene.units import plain
 Function = TypeVar("Function", bound=Callable[..., Any])
 #: Changes of a scene: texts KEY=VALUE, or a dict of values by dotted keys.
 Overrides = Sequence[str] | dict[str, Any]
-#: Kinds of numbers that an annotation stands for, NumPy's among them.
-NUMBERS: dict[object, type] = {float: Real, int: Integral}
 
 
 def typed(function: Function) -> Function:
@@ -61,9 +59,10 @@ def _accepts(hint: Any, value: object) -> bool:
         if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
             return False
         return str not in get_args(hint) or all(isinstance(option, str) for option in value)
-    if kind in NUMBERS and isinstance(value, bool):
-        return False
-    return isinstance(value, NUMBERS.get(kind, kind))
+    if kind in (float, int):  # numbers of NumPy, too
+        number = Real if kind is float else Integral
+        return isinstance(value, number) and not isinstance(value, bool)
+    return isinstance(value, kind)
 
 
 def _is_union(hint: Any) -> bool:

@@ -16,8 +16,6 @@ from repro.scene.units import SceneError, nearest, odd_character
 #: tomllib needs up to 400 times as much memory.
 LARGEST = 300_000
 MOST_PARTS = 8  # of a dotted key; tomllib's memory grows with their square
-#: A value with a unit, without quotes.
-BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")
 #: Tokens of TOML, without backtracking: possible parts of a key, dots, and the rest.
 TOKEN = re.compile(
     r'''(?P<blank>[ \t]++)|(?P<dot>\.)|(?P<comment>\#[^\n]*+)
@@ -116,7 +114,8 @@ def _line_of(text: str, message: str) -> str:
     line = line.strip()
     quotes = '; a value with a unit stands in quotes, such as width = "50 um"'
     path = "; a path has / or stands in single quotes, such as file = 'C:\\images\\colony.png'"
-    hint = quotes if BARE.search(line) else path if "\\" in line else ""
+    has_unit = re.search(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]", line)
+    hint = quotes if has_unit else path if "\\" in line else ""
     hint = hint if letter.isascii() else f"; {odd_character(letter)}"
     return f": {shortened(line, 80)}{hint}"
 

@@ -56,7 +56,6 @@ from repro.scene.units import (
 )
 from repro.schemes import CURVED, PAPER, PRINTED, Scheme
 
-SEED_RADIUS = 5.0  # um, Table 1
 STEADY = "0.001 1/h"
 LAMBDA = 2000.0  # Table 1
 RATIO = 1.52  # F, mg/mg, Table 1
@@ -123,7 +122,7 @@ class Aggregate:
 
     def __post_init__(self):
         if self.radius is None and self.outline is None:
-            object.__setattr__(self, "radius", SEED_RADIUS)
+            object.__setattr__(self, "radius", 5.0)  # um, Table 1
 
     def height(self, width: float) -> float:
         """Distance (um) of its highest point from its wall, in a pore of a width (um)."""

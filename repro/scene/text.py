@@ -23,11 +23,6 @@ from repro.scene.files import key_of, read_text
 from repro.scene.reading import entries, toml_value
 from repro.scene.units import Choice, Flag, Number
 
-WIDTH = 100
-HEAD = ("A \"#\" without a space is before what this scene leaves out, or leaves to the default "
-        "shown: remove it to set the key. \"Paper\" is Dupin, Kitanidis & McCarty (2001), by "
-        "section, equation or table; [En] are its ambiguities, reference/ERRATA.md.")
-
 
 def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> str:
     """The TOML text of a packaged scene or of a file, with the changes of --set and --unset.
@@ -39,7 +34,10 @@ def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] 
     scene = parse_scene(tables, Path(source).stem, source, changed)
     name = "".join(letter if letter.isprintable() and letter.isascii() else "?"
                    for letter in scene.name)
-    lines = [*_comment(f"Scene {name}. {HEAD}")]
+    lines = [*_comment(
+        f"Scene {name}. A \"#\" without a space is before what this scene leaves out, or leaves to "
+        "the default shown: remove it to set the key. \"Paper\" is Dupin, Kitanidis & McCarty "
+        "(2001), by section, equation or table; [En] are its ambiguities, reference/ERRATA.md.")]
     for key, entry in entries(Scene).items():
         written = tables.get(key, {})
         part = getattr(scene, entry.name)
@@ -120,5 +118,5 @@ def _default(field: Field, value: object) -> object:
 
 
 def _comment(text: str) -> Iterator[str]:
-    yield from textwrap.wrap(text, WIDTH, initial_indent="# ", subsequent_indent="# ",
+    yield from textwrap.wrap(text, 100, initial_indent="# ", subsequent_indent="# ",
                              break_on_hyphens=False)

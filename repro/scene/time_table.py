@@ -100,7 +100,6 @@ def time_tables(part: object) -> tuple[TimeTable, ...]:
 
 def jump_times(section: dict) -> list[float]:
     """The times (h) of jumps in the text of a section; a table in steps is a list."""
-    lists = [section[key] for key in ("head", "mean_velocity", "rate", "supply")
-             if isinstance(section.get(key), list)]
+    lists = [value for value in section.values() if isinstance(value, list)]
     return sorted({float(later[0].split()[0]) for entries in lists
                    for earlier, later in pairwise(entries) if earlier[1] != later[1]})

@@ -43,8 +43,6 @@ NOUNS = {
     "MPa": "a pressure or modulus",
     "rad": "an angle",
 }
-ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "ppm" is an angle too
-MASSES = ("mg/L", "1/h")  # units of values that other models give in moles
 LONGEST = 80  # characters of a value with its unit
 MOST_POINTS = 1000  # of an outline
 DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -53,15 +51,10 @@ _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
 #: Signs of printed units, as a keyboard writes them.
 _PRINTED = str.maketrans("\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
                          "\u207b\u2212\u00b7\u22c5", "0123456789--**")
-_PERCENT = re.compile(rf"({DIGITS}) *%")
-_QUANTITY = re.compile(rf"({DIGITS}) *({_UNIT})")
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,29}")
 _MOLES = re.compile(r"(?<![A-Za-z])(?:[num\u00b5\u03bc]|milli|micro|nano)?"
                     r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
-_ODD = re.compile(r"[^A-Za-z0-9\u00b5\u03bc .+*/^-]")
 NOT_IN_PAPER = "Not in the paper"
 NO_MOLES = "moles need a molar mass, which is not known here: give milligrams"
-NO_PARTS = "give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"
 
 
 class Range(NamedTuple):
@@ -243,7 +236,7 @@ class Share(Quantity):
 
     def read(self, value: object) -> float | Fraction:  # type: ignore[override]  # or a share
         text = value if isinstance(value, str) and len(value) <= LONGEST else ""
-        match = _PERCENT.fullmatch(text)
+        match = re.fullmatch(rf"({DIGITS}) *%", text)
         if match is None:
             return super().read(value)
         if not 0 < float(match[1]) <= 100:
@@ -325,8 +318,8 @@ class Word(Plain):
 
     def accepts(self, value: object) -> bool:
         """Return whether a value is a name."""
-        return (isinstance(value, str) and _NAME.fullmatch(value) is not None
-                and value.casefold() not in ("inf", "infinity", "nan"))
+        return (isinstance(value, str) and value.casefold() not in ("inf", "infinity", "nan")
+                and re.fullmatch("[A-Za-z][A-Za-z0-9_-]{0,29}", value) is not None)
 
     def read(self, value: object) -> str:
         if not self.accepts(value):
@@ -386,20 +379,17 @@ class Points:
 
     def read(self, value: object) -> tuple[tuple[float, float], ...] | Drawn:
         if isinstance(value, dict):
-            return self._drawn(value)
+            if value.keys() != {"file", "um_per_unit"} or not isinstance(value["file"], str):
+                raise ValueError("a file has the keys file and um_per_unit")
+            try:
+                return Drawn(value["file"], self.scale.read(value["um_per_unit"]))
+            except ValueError as error:
+                raise Refused("um_per_unit, the length of a unit or pixel in um, is a plain number "
+                              f"greater than zero{because(error)}") from None
         points = as_list(value)
         if points is None or not 3 <= len(points) <= MOST_POINTS:
             raise ValueError(_wrong_type(value))
         return tuple(_each("point", self._point, points))
-
-    def _drawn(self, value: dict) -> Drawn:
-        if value.keys() != {"file", "um_per_unit"} or not isinstance(value["file"], str):
-            raise ValueError("a file has the keys file and um_per_unit")
-        try:
-            return Drawn(value["file"], self.scale.read(value["um_per_unit"]))
-        except ValueError as error:
-            raise Refused("um_per_unit, the length of a unit or pixel in um, is a plain number "
-                          f"greater than zero{because(error)}") from None
 
     def _point(self, value: object) -> tuple[float, float]:
         pair = as_list(value)
@@ -538,7 +528,7 @@ def _parts(value: object) -> tuple[str, str]:
     """Split a number with a unit into its digits and the unit. Raises ValueError for others."""
     value = plain(value) if hasattr(value, "magnitude") else value
     text = value.translate(_PRINTED) if isinstance(value, str) and len(value) <= LONGEST else ""
-    match = _QUANTITY.fullmatch(text)
+    match = re.fullmatch(rf"({DIGITS}) *({_UNIT})", text)
     if match is None:
         raise ValueError(_fault(value))
     return match[1], match[2]
@@ -550,7 +540,7 @@ def _fault(value: object) -> str:
         return _wrong_type(value)
     if len(value) > LONGEST:
         return f"it has more than {LONGEST} characters"
-    odd = _ODD.search(value.translate(_PRINTED))
+    odd = re.search(r"[^A-Za-z0-9\u00b5\u03bc .+*/^-]", value.translate(_PRINTED))
     if odd:
         return odd_character(odd[0])
     start = re.match(DIGITS, value)
@@ -688,7 +678,8 @@ def _conversion(from_unit: str, unit: str) -> Fraction:
 
     Raises ValueError if it is no unit, or of another dimension.
     """
-    if unit == "rad" and from_unit not in ANGLES:
+    angle = exact.UNITS["rad"][1:]
+    if unit == "rad" and exact.UNITS.get(from_unit, (1,))[1:] != angle:  # to pint "ppm" is one too
         raise ValueError(f"{from_unit} is not a unit of angle")
     if unit != "rad" and _has_dimensionless_factor(from_unit):
         raise ValueError(f"{from_unit} has a factor without dimension")
@@ -724,10 +715,10 @@ def _unfit(from_unit: str, unit: str) -> str:
 
     The reason names the factor without which the unit is accepted, else the whole unit.
     """
-    if unit in MASSES and _MOLES.search(from_unit):
+    if unit in ("mg/L", "1/h") and _MOLES.search(from_unit):  # values of other models
         return NO_MOLES
     if unit == "mg/L" and from_unit in ("ppm", "ppb"):
-        return NO_PARTS
+        return "give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"
     for factor in exact.FACTOR.finditer(from_unit):
         rest = from_unit[:factor.start()] + from_unit[factor.end():]
         with suppress(ValueError):

@@ -10,7 +10,6 @@ WORDS: dict[str, tuple[str, ...]] = {
     "steps": ("updates", "midpoint"),
     "carrier": ("w", "u"),
     "inlet": ("local", "mean"),
-    "transfer": ("projection", "interpolation", "shares"),
 }
 #: {elements: accepted transfers of biomass to a new mesh}.
 TRANSFERS = {"linear": ("projection", "interpolation"), "quadratic": ("shares",)}

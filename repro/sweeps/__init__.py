@@ -11,3 +11,6 @@
     page      summary.html
     driver    a sweep from its factors to its page
 """
+
+#: The part of the first conductivity at which a pore counts as clogged.
+CLOGGED = 0.1

@@ -19,15 +19,13 @@ from repro.runs.scripts import load_run
 from repro.scene import SceneError, Source, label
 from repro.scene.arguments import Overrides, typed
 from repro.scene.needed import package
-from repro.sweeps import cluster, design, own_points, page, pool, table
+from repro.sweeps import CLOGGED, cluster, design, own_points, page, pool, table
 from repro.sweeps.folder import Sweep, lock_folder
 from repro.timing import progress_bar
 
 if TYPE_CHECKING:
     from repro.results.permeability import Permeability
 
-#: The part of the first conductivity at which a pore counts as clogged.
-CLOGGED = 0.1
 #: Receives the events {"event": "start" or "run", "done": runs, "total": runs, ...}.
 Tell = Callable[[dict[str, Any]], None]
 

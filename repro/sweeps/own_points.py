@@ -19,10 +19,6 @@ from repro.scene.reading import quote
 from repro.scene.units import plain
 from repro.sweeps.design import MOST_POINTS, Factor, at, bare, number
 
-HEAD = re.compile(r"\s*([^\s()]+)\s*(?:\(([^()]*)\))?\s*")
-#: Texts of a missing number, and of one that is not finite.
-NO_VALUE = ("", "nan", "none", "nat", "<na>", "inf", "-inf")
-
 
 def origin(points: Any) -> str:
     """Name points in messages: the path of a file, or the argument."""
@@ -71,7 +67,7 @@ def _tabulated(file: str, columns: Iterable[tuple]) -> list[Factor]:
     """Return the factors of named columns: numbers in one unit, or words."""
     factors: list[Factor] = []
     for name, *cells in columns:
-        match = HEAD.fullmatch(str(name))
+        match = re.fullmatch(r"\s*([^\s()]+)\s*(?:\(([^()]*)\))?\s*", str(name))
         place = f"column {quote(str(name))}"
         if not match or match[1] in [factor.key for factor in factors]:
             raise SceneError(f"{file}: row 0, {place}: a key that no other column has, with its "
@@ -81,7 +77,8 @@ def _tabulated(file: str, columns: Iterable[tuple]) -> list[Factor]:
         kinds = [(bool(digits), unit) for digits, unit in parts]
         for row, (text, (digits, _)) in enumerate(zip(texts, parts), 1):
             infinite = digits and math.isinf(float(digits))
-            if text.lower() in NO_VALUE or infinite or kinds[row - 1] != kinds[0]:
+            missing = text.lower() in ("", "nan", "none", "nat", "<na>", "inf", "-inf")
+            if missing or infinite or kinds[row - 1] != kinds[0]:
                 raise SceneError(f"{file}: row {row}, {place}: {quote(text)}: a finite number in "
                                  "the unit of row 1, or a word as there, is needed")
         numeric, unit = kinds[0] if kinds else (False, "")

@@ -22,11 +22,6 @@ from repro.sweeps.table import NUMBERS, SweepRun
 LEVELS = 7
 #: The parts of viridis that are visible on a light page and on a dark one.
 ON_LIGHT, ON_DARK = (0.0, 0.65), (0.35, 1.0)
-#: Radius of the dots of runs.
-RADIUS = 4
-#: The numbers in the row of a run, without those that no run has.
-TABLE_NUMBERS = (*"""end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
-""".split(), *ANSWER, "wall_time_s")
 
 
 def write(sweep: Sweep, runs: list[SweepRun], clogged: float) -> None:
@@ -188,7 +183,7 @@ def _against(sweep: Sweep, value: Callable[[SweepRun], float], axis: str, title:
         level = _level(coloured_by, run.point.values[colour_index])
         unit = " h" if value is _time else ""
         text = f"{_run_title(sweep, run)}: {'' if reached else 'after '}{value(run):.4g}{unit}"
-        marks.append(charts.dot(place, level, text, RADIUS) if reached else
+        marks.append(charts.dot(place, level, text, 4.0) if reached else
                      charts.triangle(place, level, text))
         rest = run.point.values[:k] + run.point.values[k + 1:]
         series.setdefault(rest, (level, []))[1].extend([place] if reached else [])
@@ -222,7 +217,9 @@ def _time(run: SweepRun) -> float:
 def _table(sweep: Sweep, runs: list[SweepRun]) -> str:
     quantities = KNOWN | {each.name: each for each in NUMBERS}
     values = [run.numbers | run.final for run in runs]
-    shown = [name for name in TABLE_NUMBERS if any(each.get(name) is not None for each in values)]
+    known = ("end_h", "clogging_time_h", "clogging_biomass", "contact_time_h", "contact_biomass",
+             *ANSWER, "wall_time_s")
+    shown = [name for name in known if any(each.get(name) is not None for each in values)]
     names = ["run", *(factor.key for factor in sweep.factors)]
     for number in map(quantities.__getitem__, shown):
         symbol = number.unit.symbol

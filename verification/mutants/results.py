@@ -544,7 +544,7 @@ MUTANTS = (
         ("moles-of-time",
          "A capital M in a time is answered with moles.",
          "_unfit",
-         "unit in MASSES and _MOLES.search(from_unit)",
+         'unit in ("mg/L", "1/h") and _MOLES.search(from_unit)',
          "_MOLES.search(from_unit)",
          "tests/test_scene_refusals.py::test_hints_are_given_only_if_they_help"),
         ("whole-unit-refused",
@@ -830,6 +830,12 @@ MUTANTS = (
          "status.startswith(FAILED)",
          "status == FAILED",
          "tests/test_sweep.py::test_every_status_takes_its_whole_path_through_a_sweep"),
+        ("unknown-and-over",
+         "A run whose status this version does not know is repeated or left as finished.",
+         "is_known",
+         "status.startswith(FAILED)",
+         "True",
+         "tests/test_resume.py::test_a_run_of_unknown_status_is_neither_resumed_nor_repeated"),
         ("failure-that-names-a-fold",
          "A failure whose message names a fold counts as a fold.",
          "is_fold",
@@ -873,14 +879,14 @@ MUTANTS = (
         ("list-leads-out",
          "Every path that run.json lists counts as a file of the run.",
          "list_written_files",
-         "names = {name for name in listed if name in own or FIELDS.fullmatch(name)}",
-         "names = {name for name in listed if name}",
+         "is_own(name) or name == 'timeseries.nc'",
+         "name",
          "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files"),
         ("former-files-stay",
          "The NetCDF file of a run of an earlier version stays beside the run that replaces it.",
          "list_written_files",
-         "name in own",
-         "name in RUN_FILES",
+         "is_own(name) or name == 'timeseries.nc'",
+         "is_own(name)",
          "tests/test_resume.py::test_a_forced_run_removes_only_the_listed_files")),
     *changes(
         "repro/runs/execution.py",
@@ -1153,8 +1159,8 @@ MUTANTS = (
         ("ratio-with-the-donor-alone",
          "check warns about F in a scene without acceptor.",
          "",
-         '("kinetics", "substrates.acceptor")',
-         '("kinetics",)',
+         '_check("kinetics", "substrates.acceptor")',
+         '_check("kinetics")',
          "tests/test_check.py::test_a_warning_speaks_of_no_part_that_the_scene_leaves_out"),
         ("one-strength-checked",
          "check does not say that the flow cannot exceed the tensile strength.",
@@ -1583,26 +1589,18 @@ MUTANTS = (
         ("sweep-ignores-seed",
          "The command ignores --seed.",
          "call",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
-         "scheduler=options.scheduler, clogged=options.clogged, progress=on_terminal and not options.quiet, "
-         "tell=None if on_terminal or options.quiet else _print_run)",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, workers=options.workers, scheduler=options.scheduler, "
-         "clogged=options.clogged, progress=on_terminal and not options.quiet, tell=None if on_terminal or "
-         "options.quiet else _print_run)",
+         "('points', 'unset', 'samples', 'seed')",
+         "('points', 'unset', 'samples')",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect"),
         ("sweep-ignores-clogged",
          "The command ignores --clogged.",
          "call",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
+         "driver.sweep(options.scene, options.vary, options.out, options.set, **design, workers=options.workers, "
          "scheduler=options.scheduler, clogged=options.clogged, progress=on_terminal and not options.quiet, "
          "tell=None if on_terminal or options.quiet else _print_run)",
-         "driver.sweep(options.scene, options.vary, options.out, options.set, points=options.points, "
-         "unset=options.unset, samples=options.samples, seed=options.seed, workers=options.workers, "
-         "scheduler=options.scheduler, progress=on_terminal and not options.quiet, tell=None if on_terminal "
-         "or options.quiet else _print_run)",
+         "driver.sweep(options.scene, options.vary, options.out, options.set, **design, workers=options.workers, "
+         "scheduler=options.scheduler, progress=on_terminal and not options.quiet, "
+         "tell=None if on_terminal or options.quiet else _print_run)",
          "tests/test_sweep.py::test_every_option_of_the_command_has_its_effect")),
     *changes(
         "repro/sweeps/driver.py",
@@ -1960,6 +1958,12 @@ MUTANTS = (
          "factor * self.um_per_pixel * np.array(np.shape(pixels)[:2])",
          "factor * np.array(np.shape(pixels)[:2])",
          "tests/test_shapes.py::test_outlines_lie_over_an_image"),
+        ("palette-of-the-first-frame",
+         "A film has the most frequent colours of its first frame only.",
+         "_write_gif",
+         "sample.quantize(method=image.Quantize.MAXCOVERAGE)",
+         "pictures[0].quantize()",
+         "tests/test_drawing.py::test_a_film_has_the_colours_of_its_colour_bar_in_all_frames"),
         ("film-of-own-scales",
          "Each frame of a film has colours of its own.",
          "_frames",
@@ -2030,9 +2034,9 @@ MUTANTS = (
         "repro/preflight/modelled.py",
         ("velocity-said",
          "check reports the mean velocity in um/h as m/day.",
-         "_flow",
-         "f\"driven by a mean velocity of {_over_time(flow.mean_velocity, 24e-6, 'm/day')}\"",
-         "f\"driven by a mean velocity of {_over_time(flow.mean_velocity, 1e-6, 'm/day')}\"",
+         "_over_time",
+         'f"{factor * value:.4g} {unit}"',
+         'f"{value:.4g} {unit}"',
          "tests/test_check.py::test_check_describes_values_over_time"),
         ("last-from",
          "check reports the first time of a table as the last.",
@@ -2055,8 +2059,8 @@ MUTANTS = (
         ("donor-said",
          "check reports the acceptor's supply as the donor's.",
          "_substrates",
-         "f\"{name} ({_over_time(kind.supply, 1.0, 'mg/L')})\"",
-         "f\"{name} ({_over_time(scene.substrates.acceptor.supply, 1.0, 'mg/L')})\"",
+         "f\"{name} ({_over_time(kind.supply, '_mg_per_L')})\"",
+         "f\"{name} ({_over_time(scene.substrates.acceptor.supply, '_mg_per_L')})\"",
          "tests/test_check.py::test_check_describes_values_over_time"),
         ("end-said",
          "check reports the time step as the end.",
@@ -2897,7 +2901,7 @@ MUTANTS = (
         ("missing-value-is-a-word",
          "A missing value of a column of words is a word.",
          "_tabulated",
-         "text.lower() in NO_VALUE",
+         "text.lower() in (\"\", \"nan\", \"none\", \"nat\", \"<na>\", \"inf\", \"-inf\")",
          "False",
          f"{POINTS}bad_points_are_refused_in_one_line")),
     *changes(
