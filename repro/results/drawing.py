@@ -308,15 +308,16 @@ def _write_gif(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any) -> A
     colour bar.
     """
     image = optional("PIL.Image")
-    pictures: list[Any] = []
+    contents: list[io.BytesIO] = []
     for last in frames(ax):
-        content = io.BytesIO()
-        last.figure.savefig(content, format="png", dpi=RESOLUTION)
+        contents.append(io.BytesIO())
+        last.figure.savefig(contents[-1], format="png", dpi=RESOLUTION)
         last.figure.set_layout_engine("none")
-        pictures.append(image.open(content).convert("RGB"))
-    sample = image.fromarray(np.vstack(pictures[::len(pictures) // 10 + 1]))
+    chosen = contents[::len(contents) // 10 + 1]
+    sample = image.fromarray(np.vstack([image.open(each).convert("RGB") for each in chosen]))
     palette = sample.quantize(method=image.Quantize.MAXCOVERAGE)
-    first, *others = (each.quantize(palette=palette, dither=0) for each in pictures)
+    first, *others = (image.open(each).convert("RGB").quantize(palette=palette, dither=0)
+                      for each in contents)
     first.save(file, format="GIF", save_all=True, append_images=others, duration=FRAME, loop=0)
     return last
 
