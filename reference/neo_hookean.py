@@ -25,12 +25,6 @@ For theta = a + c (R/R_0)^2: r^2 = a R^2 + c R^4 / (2 R_0^2). The integral is ta
 import numpy as np
 
 
-def energy(F):
-    """mu/2 (J^(-2/3) tr C - 3) for mu = 1 (17), of F (..., 2, 2)."""
-    J = np.linalg.det(F)
-    return 0.5 * (J ** (-2 / 3) * (np.sum(F**2, axis=(-2, -1)) + 1) - 3)
-
-
 def cauchy(F, P):
     """Cauchy stress (3, 3) of a homogeneous plane deformation F (2, 2), F33 = 1, at pressure P."""
     gradient = np.eye(3)

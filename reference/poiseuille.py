@@ -6,11 +6,6 @@ Between walls at y = 0 and y = W, (1) is nu/g u_x'' = dphi/dx. With u_x = 0 on t
 
 since u_x'' = -12 u_ave / W^2 and the mean of 6 s (1 - s) over 0..1 is one. The head loss over a length L is 12 nu u_ave
 L / (g W^2), hence the conductivity K = u_ave L / dphi = g W^2 / (12 nu).
-
-A small rise of viscosity in a part B of the channel changes the loss, to first order, by the dissipation of the
-unchanged flow in B. The flow has the least dissipation of all velocities with its flux, so the change of velocity has
-an effect of second order only. The rise over (lambda - 1) nu u_ave / g is int_B (36 / W^2) (1 - 2 y / W)^2 dA / W in
-either form of [E2], as |grad u|^2 = u_x'^2 = 2 e:e.
 """
 
 
@@ -27,8 +22,3 @@ def head_loss(length, width, mean_velocity, viscosity):
 def conductivity(width, viscosity):
     """u_ave L / dphi of a clean channel; viscosity is nu/g."""
     return width**2 / (12 * viscosity)
-
-
-def dissipation(y, width):
-    """|grad u|^2 at heights y, for a mean velocity of one."""
-    return (6 / width * (1 - 2 * y / width)) ** 2

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay
 from skfem import (
     Basis,
     BilinearForm,
@@ -48,26 +48,10 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Pressure:
-    """Pressure (K,) of one region at the midpoints of edges, points (K, 2), with their weights (K,)."""
-
-    biomass: bool
-    points: np.ndarray
-    values: np.ndarray
-    areas: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class Stokes:
-    """Solution for a mean velocity of one: loss of p over the mesh; velocity (K, 2) at the midpoints of edges, points
-    (K, 2), with weights (K,) of a third of the triangles' areas, which integrate quadratic functions exactly; and the
-    pressure of each region, which jumps at the interface."""
+    """Solution for a mean velocity of one: loss of p over the mesh."""
 
     loss: float
-    points: np.ndarray
-    velocity: np.ndarray
-    areas: np.ndarray
-    pressures: tuple[Pressure, ...]
 
 
 def half_disc(width, ends, radius, refinements, corner=6):
@@ -119,25 +103,6 @@ def _film(mesh, radius):
     return np.flatnonzero((np.abs(x) < 0.75 * radius) & (np.hypot(x, y) > 0.8 * radius))
 
 
-def mirrored(channel):
-    """The channel and its mirror image beyond y = width: twice as wide, with an aggregate on each wall."""
-    half, top = channel.mesh, 2 * channel.width
-    corners, bent = np.split(half.doflocs, [half.nvertices], axis=1)
-    off_the_plane = np.flatnonzero(corners[1] < channel.width * (1 - 1e-9))
-    image = np.arange(half.nvertices)
-    image[off_the_plane] = half.nvertices + np.arange(len(off_the_plane))
-    points = np.hstack([corners, [[0.0], [top]] + corners[:, off_the_plane] * [[1.0], [-1.0]]])
-    both = MeshTri(points, np.hstack([half.t, image[half.t]]))
-    basis = Basis(both, ElementTriP2())
-    places, middles = basis.doflocs.copy(), basis.facet_dofs[0]
-    straight = corners[:, half.facets].mean(axis=1)
-    above = places[1, middles] > channel.width
-    folded = np.where(above, top - places[1, middles], places[1, middles])
-    _, facet = cKDTree(straight.T).query(np.column_stack([places[0, middles], folded]))
-    places[:, middles] = np.where(above, [[0.0], [top]] + bent[:, facet] * [[1.0], [-1.0]], bent[:, facet])
-    return Channel(MeshTri2(places, both.t), np.tile(channel.biomass, 2), top, channel.ends)
-
-
 def stokes(channel, ratio, interface="laplacian"):
     """Solve for the flow, :class:`Stokes`. Each region has its own pressure, which jumps at the interface."""
     basis = Basis(channel.mesh, ElementVector(ElementTriP2()), intorder=5)
@@ -149,22 +114,7 @@ def stokes(channel, ratio, interface="laplacian"):
     x = np.concatenate([value, np.zeros(B.shape[0])])
     solution = solve(*condense(bmat([[A, -B.T], [-B, None]], "csr"), np.zeros(len(x)), x=x, D=constrained))
     parts = np.split(solution[basis.N:], np.cumsum([len(used) for *_, used in regions])[:-1])
-    pressures = tuple(_pressure(channel, region, part) for region, part in zip(regions, parts))
-    loss = sum(_loss(channel, lower, used, part) for (_, lower, used), part in zip(regions, parts))
-    middles = basis.facet_dofs[:2]
-    return Stokes(loss, basis.doflocs[:, middles[0]].T, solution[middles].T, _weights(channel, basis), pressures)
-
-
-def _pressure(channel, region, values):
-    """:class:`Pressure` of a region from its unknowns."""
-    velocity, lower, used = region
-    pressure = np.zeros(lower.N)
-    pressure[used] = values
-    weights = _weights(channel, velocity)
-    in_region = weights > 0
-    middles = pressure[channel.mesh.facets[:, in_region]].mean(axis=0)
-    return Pressure(bool(channel.biomass[velocity.tind[0]]), velocity.doflocs[:, velocity.facet_dofs[0, in_region]].T,
-                    middles, weights[in_region])
+    return Stokes(sum(_loss(channel, lower, used, part) for (_, lower, used), part in zip(regions, parts)))
 
 
 def _loss(channel, lower, used, values):
@@ -179,13 +129,6 @@ def _region(channel, triangles):
     velocity = Basis(channel.mesh, ElementVector(ElementTriP2()), elements=np.flatnonzero(triangles), intorder=5)
     lower = velocity.with_element(ElementTriP1())
     return velocity, lower, np.unique(lower.element_dofs)
-
-
-def _weights(channel, basis):
-    """A third of the area of the triangles beside each edge, as far as they belong to the basis."""
-    mesh, elements = channel.mesh, slice(None) if basis.tind is None else basis.tind
-    share = np.repeat(basis.dx.sum(axis=1)[None] / 3, 3, axis=0)
-    return np.bincount(mesh.t2f[:, elements].ravel(), share.ravel(), mesh.nfacets)
 
 
 def _component(basis):

@@ -1,5 +1,5 @@
 """Schemes: what each choice changes, where a scheme is refused, and what keeps it. The case transport-as-printed tests
-the defects of the printed choices, and the cases coupling-ledger and coupling-contact that the others conserve."""
+the defects of the printed choices, and the cases coupling-ledger and coupling-one-balance that the others conserve."""
 from dataclasses import asdict, replace
 
 import numpy as np

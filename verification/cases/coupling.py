@@ -1,12 +1,12 @@
 """Limits, symmetries and time steps of the coupled model.
 
-Limits: no growth, no biomass, no viscosity jump, no stiffness, and growth at the supply, where the area follows
+Limits: no growth, no viscosity jump, no stiffness, and growth at the supply, where the area follows
 (9)-(10) in closed form.
 
-Results do not depend on units, on left and right, or, where the theory is reversible, on the direction of flow. They
-hardly depend on the time step, on storage of the substrates, or on the meshed part of the pore.
+Results do not depend on units or on left and right. They hardly depend on storage of the substrates, or on the meshed
+part of the pore.
 
-The midpoint rule and the presets: order in time, the limit of the paper's updates, an independent solver.
+The midpoint rule and the presets: order in time, an independent solver.
 """
 
 from dataclasses import replace
@@ -21,7 +21,7 @@ from repro.fem import linear
 from repro.fem.space import Space
 from repro.fem.walls import FREE
 from repro.march import midpoint
-from repro.march.simulation import shaped, simulate
+from repro.march.simulation import simulate
 from repro.march.state import Report
 from repro.model import flow, solving
 from repro.model.meshing import seeded
@@ -72,40 +72,6 @@ LINEAR_BOUND = 1e-12, runs.ROUND_OFF
 HIGHER_BOUND = 1e-4, "div u is zero against functions of one order less than C's: error in space"
 
 
-REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
-#: Origins of the bounds in a clean channel: linear elements, and the others.
-LAYER = "first order: the stabilisation spoils one layer of elements at both ends of the mesh"
-PARABOLA = "the elements contain the parabola: round-off"
-
-
-@pytest.mark.case(
-    "coupling-clean-channel", kind="exact", mutants=("extent-not-subtracted", "head-on-the-mesh-alone"),
-    references=("poiseuille",), runs_with="paper")
-@parametrize("*changes", runs.every(0.3))
-def test_clean_channel(changes, record):
-    """A scene without an aggregate is a clean channel: Poiseuille's flow under the head, and C the supply everywhere.
-
-    Norm: refinement 1 to 2.8: mean velocity under the head relative to Poiseuille's; largest |C / supply - 1|.
-
-    Record the order of linear elements, and the errors of the others.
-    """
-    if load_scene("base", changes).numerics.scheme.order > 1:
-        error, lack = _clean(*changes)
-        record(at_most("mean velocity", error, 1e-9, PARABOLA))
-    else:
-        errors, lacks = zip(*(_clean(*changes, f"numerics.refinement={refinement}") for refinement in REFINEMENTS))
-        lack = max(lacks)
-        record(study("mean velocity", 1 / np.array(REFINEMENTS), errors, 1, LAYER, ceiling=2e-3))
-    record(at_most("C", lack, 1e-12, runs.ROUND_OFF))
-
-
-def _clean(*changes: str) -> tuple[float, float]:
-    """Relative error of the mean velocity; largest |C / supply - 1|."""
-    scene = load_scene("base", changes)
-    report = next(simulate(replace(scene, aggregates=(), kinetics=None, growth=None)))
-    return abs(report.solved.flow.mean_velocity / _poiseuille(scene) - 1), _lack(report)
-
-
 @pytest.mark.case(
     "coupling-equal-viscosities", kind="property", mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"),
     references=("poiseuille",), runs_with="paper")
@@ -125,7 +91,7 @@ def test_equal_viscosities(changes, record):
     record(at_most("u", np.abs(computed.velocity / computed.mean_velocity - empty.velocity).max(), 1e-13,
                    runs.ROUND_OFF),
            at_most("mean velocity", abs(computed.mean_velocity / _poiseuille(scene) - 1), 5e-3,
-                   "linear elements: first order in the mesh, 0.3 % as in coupling-clean-channel"),
+                   "linear elements: first order in the mesh, 0.3 % as in a clean channel"),
            at_least("growth of the area", last.pore.outline.area / first.pore.outline.area, 1.1,
                     "else nothing is tested"))
 
@@ -147,54 +113,28 @@ def test_stiffness(changes, record):
 
 EVERY_HOUR = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 OF_UPDATES = 1e-8, "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"
-OF_LONG_STEPS = 1e-6, "J = theta, and C to 1e-7 of the supply"
-#: Changes of a scene, by label, with the steps of a preset.
-LONG = {**{kind: (runs.with_preset("fast"), runs.with_elements(kind), runs.coarser(kind, 0.2))
-           for kind in runs.ELEMENTS},
-        **{preset: (runs.with_preset(preset),) for preset in runs.QUADRATIC[1:]}}
-
-
-def uniform_growth(hours: tuple[float, ...], bound: float, origin: str, *changes: str):
-    """Checks of a run with rows at some hours, the last of which is its end."""
-    scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
-    seed = seeded(scene).outline
-    instants = runs.reports_of(scene)
-    expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
-    sizes = {"area": [instant.pore.outline.area for instant in instants],
-             "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
-    yield each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, bound, origin)
-    yield at_most("outline", _unround(instants[-1], expected[-1]), *_roundness(scene, seed))
-    yield at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else they are not tested")
 
 
 @pytest.mark.case(
     "coupling-uniform-growth", kind="exact",
     mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
              "geometry-of-the-step-before"), runs_with="paper")
-@parametrize(
-    "*setup",
-    {kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in runs.every(0.3).items()})
-def test_uniform_growth(setup, record):
+@parametrize("*changes", runs.every(0.3))
+def test_uniform_growth(changes, record):
     """If diffusion keeps the supply everywhere, the aggregate stays a half-disc through a remesh, and its mass grows
     exactly exponentially.
 
     Norm: largest relative error of area and mass, every hour to 6 h; largest deviation of the outline from a half-disc.
     """
-    record(uniform_growth(*setup))
-
-
-@pytest.mark.case(
-    "coupling-curved-uniform-growth", kind="exact",
-    mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"), runs_with="fast",
-    omitted="paper: coupling-uniform-growth")
-@parametrize("*setup", {kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()})
-def test_curved_uniform_growth(setup, record):
-    """If diffusion keeps the supply everywhere, the aggregate stays a half-disc through remeshes and a few long steps
-    of the midpoint rule, and its mass grows exactly exponentially.
-
-    Norm: relative error of area and mass; largest deviation of the outline from a half-disc.
-    """
-    record(uniform_growth(*setup))
+    scene = runs.supplied_everywhere(runs.base("6 h", *changes, times=EVERY_HOUR))
+    seed = seeded(scene).outline
+    instants = runs.reports_of(scene)
+    expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in EVERY_HOUR])
+    sizes = {"area": [instant.pore.outline.area for instant in instants],
+             "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
+    record(each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, *OF_UPDATES),
+           at_most("outline", _unround(instants[-1], expected[-1]), *_roundness(scene, seed)),
+           at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else they are not tested"))
 
 
 def _roundness(scene, seed) -> tuple[float, str]:
@@ -252,50 +192,6 @@ def test_mirror(changes, record):
     record(at_most("tips", tips, 3e-6, "unsymmetric mesh: a tenth of the error of C_A"),
            at_most("C_A", np.abs(np.subtract(*sides)).max() / 10.0, 1e-4, "unsymmetric mesh: error in space"),
            at_least("area over the seed's", outline.area / 39.27, 2.0, "else nothing is tested"))
-
-
-@pytest.mark.case("coupling-reversed", kind="property", mutants=("inlet-held",), runs_with="paper")
-@parametrize("*changes", runs.every(0.6, 2.0))
-def test_reversed(changes, record):
-    """Reversed flow has the same resistance (Stokes flow is reversible). If uptake is of first order, it loses the same
-    amount of substrate (reciprocity of (7), (11) and (12)).
-
-    Norm: relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0.
-    """
-    forward, mirrored = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
-    differences = {name: abs(forward[name] / mirrored[name] - 1) for name in forward}
-    record(at_most("conductivity", differences["conductivity"], 3e-4, ERROR),
-           at_most("effluent", differences["effluent"], 3e-4, ERROR),
-           at_least("C at the inlet, which no theorem constrains", differences["inlet"], 3e-3,
-                    "else the aggregate is not lopsided"))
-
-
-ERROR = "error in space: linear elements 9e-4, 2e-4, 6e-5 at refinement 1, 1.4, 2"
-
-
-#: Uptake of the donor alone, 0.5/h C_D / (1 mg/L).
-FIRST_ORDER = ('substrates.acceptor.half_saturation="1e-9 mg/L"', 'substrates.donor.half_saturation="1e9 mg/L"',
-               'kinetics.maximum_utilization_rate="5e8 1/h"', 'kinetics.decay_coefficient="0 1/d"',
-               "kinetics.acceptor_to_donor_ratio=1e-12")
-
-
-def _lopsided(sign: float, *changes: str) -> dict[str, float]:
-    """Conductivity, and C at the outlet and the inlet, with uptake of first order."""
-    scene = load_scene("base", (*changes, *FIRST_ORDER))
-    scene = shaped(scene, _outline(sign, 80 * scene.numerics.scheme.order))
-    solved = solving.solve(scene, seeded(scene))
-    donor = solved.fluxes[1]
-    return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
-
-
-def _outline(sign: float, edges: int) -> np.ndarray:
-    """(edges + 1, 2) um: r = 24 um (1 + 0.35 cos a - 0.15 cos 2a), or its mirror image for sign = -1."""
-    angle = np.linspace(np.pi, 0.0, edges + 1)
-    radius = 24.0 * (1 + 0.35 * sign * np.cos(angle) - 0.15 * np.cos(2 * angle))
-    return runs.standing(radius * np.cos(angle), radius * np.sin(angle))
-
-#: Shape updates (h).
-STEPS = (0.8, 0.4, 0.2, 0.1)
 
 
 SLOWER = (16.0, 8.0, 4.0, 2.0)
@@ -392,7 +288,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
 @pytest.mark.case(
     "coupling-midpoint-order", kind="property", mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"),
     runs_with="fast",
-    omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps have no tolerance, as in fast")
+    omitted="paper: coupling-averaged-base; accurate, exact: equal steps have no tolerance, as in fast")
 @parametrize("elements", {each: (each,) for each in runs.ELEMENTS}, slow=("quadratic",))
 def test_midpoint_order(elements, record):
     """The midpoint rule is of second order in time, with every kind of elements.
@@ -405,29 +301,6 @@ def test_midpoint_order(elements, record):
     changes = np.abs(np.diff(values, axis=0) / values[-1])
     record([study(name, 2 / np.array(RULE_STEPS[:-1]), column, 2, "midpoint rule", ceiling=2e-5, band=0.15)
             for name, column in zip(("area", "upstream tip"), changes.T)])
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-midpoint-limit", kind="property",
-    mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), runs_with="paper",
-    omitted="fast, accurate, exact: coupling-midpoint-order; their own tolerances would show")
-@parametrize("*changes", runs.kinds(0.3, 0.6))
-def test_midpoint_limit(changes, record):
-    """With short steps the paper's shape updates and the midpoint rule agree on the same triangles: the loop of updates
-    has first order in the step, because the geometry is frozen within a step.
-
-    Norm: relative difference at 3.2 h from a seed of 25 um, base, no remesh.
-    """
-    short = (exchange(steps="midpoint"), "numerics.tolerance=0.00003")
-    reports = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *setting))
-             for setting in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
-    record(at_most("remeshes, all runs", sum(instant.remeshes for instant in reports), 0.0,
-                   "one mesh: the error in space is common"))
-    exact, *rows = map(runs.numbers, reports)
-    for name, value in exact.items():
-        record(study(name, STEPS, [abs(row[name] / value - 1) for row in rows], 1, "frozen geometry: first order",
-                     ceiling=2e-3, band=0.15))
 
 
 TIMES = (19.2, 19.4)

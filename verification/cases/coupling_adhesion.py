@@ -250,34 +250,3 @@ def _pushed(seed: Pore, shift: float) -> Pore:
     points = seed.mesh.points.copy()
     points[seed.mesh.body, 0] += shift
     return seed.moved(points)
-
-
-SIZES = (0.35, 0.5, 0.7, 1.0)
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-bonded-traction", kind="property", mutants=("traction-at-a-point", "tensile-stress-of-triangles"),
-    omitted="order 1: the balance")
-@parametrize("*changes", {"quadratic": (runs.with_elements("quadratic"),)})
-def test_bonded_traction(changes, record):
-    """The largest traction on a bonded wall and the largest tensile stress converge with the mesh, although the stress
-    at the contact line is singular.
-
-    Norm: base's half-disc after growth by a tenth that varies along x: both, in their means over W / 20, at four
-    refinements, less those at twice the finest, over the latter.
-    """
-    peaks = np.array([_bonded_peaks(size, *changes) for size in (*SIZES, 2.0)])
-    errors = np.abs(peaks[:-1] / peaks[-1] - 1)
-    for name, error in zip(("traction", "tensile stress"), errors.T):
-        record(at_most(f"{name}, at the coarsest", error[0], 0.05,
-                       "a few percent, the error of the worst number of `fast`"),
-               at_most(f"{name}, at the finest", error[-1], 0.01, "1 %, the accuracy of the columns of adhesion"))
-
-
-def _bonded_peaks(refinement: float, *changes: str) -> tuple[float, float]:
-    """Largest traction of the walls and largest tensile stress, MPa."""
-    scene = scene_of('growth.wall="bonded"', f"numerics.refinement={refinement}", *changes)
-    _, shape = _unevenly_grown(scene, 0.005)
-    loading = Loading.of(scene)
-    return adhesion.wall_peak(loading, shape, None).value, adhesion.tensile_peak(loading, shape, None).value

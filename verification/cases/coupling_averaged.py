@@ -7,28 +7,21 @@ starved. Supplies that change over time starve an aggregate and let it recover.
 """
 
 import json
-from dataclasses import replace
 from functools import cache
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from reference import averaged_pore, layered_channel, poiseuille, taylor_hood
+from reference import averaged_pore, poiseuille, taylor_hood
 from repro import results
-from repro.fem import mesher
-from repro.fem.outline import polygon
-from repro.fem.sizing import Sizing
-from repro.fem.walls import channel_walls
-from repro.march.simulation import shaped, simulate
-from repro.model import flow, solving
-from repro.model.meshing import seeded
+from repro.march.simulation import simulate
 from repro.scene import Scene
 from verification.evidence.cases import parametrize
-from verification.evidence.checks import at_least, at_most, between, refine, studies, study
-from verification.problems import meshes, runs
-from verification.problems.channels import NAMES, SCENE
+from verification.evidence.checks import at_least, at_most, between, refine, study
+from verification.problems import runs
+from verification.problems.channels import NAMES
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
 #: Radii (um) of half-discs whose loss Taylor-Hood elements compute, and the reach (um) of their meshes beyond them.
@@ -81,7 +74,7 @@ def _at_our_area(scene, instants) -> float:
                for report, radius in zip(instants, radii))
 
 
-SQUARE_LAW = "the square of the transverse Thiele number, as measured in coupling-averaged-run: 1.2 % of the area"
+SQUARE_LAW = "the square of the transverse Thiele number: 1.2 % of the area"
 
 
 def speeds(scene):
@@ -149,157 +142,6 @@ def _leaving(factor: float, scene: Scene) -> dict[str, float]:
     for name, expected, first_order in zip(NAMES, runs.half_disc(scene).seed().fields[:, -1], first):
         gap = row[f"effluent_{name}_mg_per_L"] - expected
         differences |= {name: abs(gap), f"{name} over first": gap / first_order}
-    return differences
-
-
-SLOWER = (8.0, 16.0, 32.0, 64.0)
-MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-averaged-run", kind="cross-code", mutants=("rates-two-percent-low",),
-    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="1 2",
-    omitted="fast: its own error in time would show; exact: accurate has a smaller tolerance here")
-@pytest.mark.parametrize("preset", ("paper", "accurate"))
-def test_averaged_run(preset, record):
-    """The whole base run is that of the averaged pore (FiPy, solve_ivp) up to the square of the transverse Thiele
-    number, and base itself is where that square puts it.
-
-    Norm: largest difference at 5, 10, 15 and 19.4 h: area relative, effluents and section means of C along the mesh
-    over the supply; base at 2.9 m/d, diffusivities times 8 to 64; paper, and accurate with a fifth of its tolerance,
-    because its own error in time, 4e-5, would show.
-    """
-    errors, base = refine(_whole_run, SLOWER, preset), _whole_run(1.0, preset)
-    record(studies(errors, dict.fromkeys(COMPARED, (2, SQUARE, 3e-4))))
-    for name in COMPARED[:2]:
-        record(between(f"base, {name}: over the square law through the first of these",
-                       base[name] / (SLOWER[0] * errors[name][0]), 1.0, 2.0, "terms of fourth order"))
-
-
-def _whole_run(factor: float, preset: str) -> dict[str, float]:
-    """Thiele number and largest differences of one run."""
-    finer = ("numerics.tolerance=0.0002",) if preset == "accurate" else ()
-    scene = runs.faster(runs.base("19.4 h", runs.with_preset(preset), *finer, times=MIXING_TIMES), factor)
-    moments = runs.half_disc(scene).run(MIXING_TIMES)
-    return {"size": thiele(scene), **runs.differences(scene, runs.reports_of(scene), moments)}
-
-
-WIDTH, THICKNESS = 20.0, 5.0
-THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
-
-
-def thin_scene(elements: str, aspect: float, speed: float = 5 * runs.SPEED, density: float = 3e6) -> Scene:
-    """Base for 1 h in a narrow pore, from a seed whose half length is its thickness over ``aspect``.
-
-    speed: mean velocity (um/h) over the aspect ratio; density: X_m (mg/L) over its square.
-    """
-    scene = runs.base("1 h", runs.with_elements(elements), runs.coarser(elements, 0.5),
-                      f'aggregate.radius="{THICKNESS} um"',
-                      f'pore.width="{WIDTH} um"', f'kinetics.maximum_density="{density * aspect**2} mg/L"',
-                      'growth.time_step="6 min"', 'growth.minimum_contact_angle="0.01 deg"', times=(0.5, 1.0))
-    return runs.at_velocity(scene, speed * aspect)
-
-
-def strip_of(scene: Scene, area: float, cells: int) -> averaged_pore.Averaged:
-    """The averaged run of a strip with the area of the meshed seed."""
-    lengths, heights = averaged_pore.half_ellipse(2 * area / (np.pi * THICKNESS), THICKNESS, cells)
-    return averaged_pore.Averaged(runs.pore_of(scene), lengths, heights, 4 * cells)
-
-
-def half_ellipse(elements: str, aspect: float) -> np.ndarray:
-    """(n, 2) um, points of a half-ellipse at equal eccentric angles. Curved triangles have twice as many edges."""
-    edges = round((32 if elements == "linear" else 64) / np.sqrt(aspect))
-    return bump(THICKNESS / aspect, lambda s: THICKNESS * np.sqrt(np.maximum(1 - s**2, 0.0)), edges)
-
-
-def bump(half_length: float, shape, edges: int) -> np.ndarray:
-    """(edges + 1, 2) um, points of the height shape(x / half_length), from the upstream end."""
-    angle = np.linspace(np.pi, 0.0, edges + 1)
-    return runs.standing(half_length * np.cos(angle), shape(np.cos(angle)))
-
-
-LOW = 8.0
-LONG = 40.0
-RATIO = 2000.0
-LENGTH = 600.0
-SLENDER = (0.25, 0.177, 0.125, 0.0884)
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-averaged-flow", kind="cross-code", mutants=("extent-not-subtracted",),
-    references=("averaged_pore", "layered_channel", "poiseuille", "taylor_hood"),
-    runs_with="2", omitted="order 1: its own error is as large as the measured difference")
-def test_averaged_flow(record):
-    """The head loss of a long aggregate is that of developed flow in each section, and the next term is that of
-    extended lubrication theory, coefficient included.
-
-    Norm: head loss of the whole pore less that of lubrication, over the excess of the latter over a clean channel;
-    refinement 1.25; a bump 8 (1 - s^2)^2 um high in 20 um.
-
-    Sides are straight: the ends of the bump lie flat on the wall, which arcs would cross.
-    """
-    losses, thin, extension = np.array([*map(_losses, SLENDER)]).T
-    clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
-    record(between("gap over that of extended lubrication, the most slender", (losses - thin)[-1] / extension[-1],
-                   0.94, 1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),
-           study("loss", SLENDER, (losses - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
-
-
-def _losses(aspect: float) -> tuple[float, float, float]:
-    """Loss per mean velocity: of the package, of lubrication theory, and the term that its extension adds.
-
-    In a channel with one wall y = h(x) the stream function in powers of the slope, to the second, gives the loss
-    12 W integral of (1 + 4/5 h'^2) / (W - h)^3 dx.
-    """
-    half, reach = LOW / aspect, LOW / aspect + LONG
-    outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), channel_walls(WIDTH))
-    grid, _ = mesher.generate_around([outline], (-reach, reach), Sizing(channel_walls(WIDTH), 1.25, 2.0))
-    drive = replace(thin_scene("linear", 0.5).flow, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
-    solution = flow.solve(meshes.space_on(grid, 2), drive, LENGTH)
-    s, weight = np.polynomial.legendre.leggauss(200)
-    height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
-    thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)
-    extension = half * weight @ (12 * WIDTH * 4 / 5 * slope**2 / (WIDTH - height) ** 3)
-    return solution.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), extension
-
-
-UPTAKE_ASPECTS = (0.2, 0.1, 0.05, 0.025)
-#: u times half the aggregate's length over D_A; X_m (mg/L) over the square of the aspect ratio.
-PECLETS, DENSITIES = (0.1, 1.0, 5.0), (1e6, 3e6, 1e7)
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-averaged-uptake", kind="cross-code", mutants=("inlet-held", "seed-too-thin"),
-    references=("averaged_pore", "poiseuille", "taylor_hood"), runs_with="paper")
-@pytest.mark.parametrize("elements", runs.ELEMENTS)
-def test_averaged_uptake(elements, record):
-    """Around thin aggregates C is the averaged pore's (FiPy) up to the square of the aspect ratio, at Peclet 0.1, 1, 5
-    and three densities, from 99 % to 1 % of the acceptor leaving.
-
-    Norm: largest difference of the section means of C_A and C_D along the mesh, over the supply; half-ellipses 5 um
-    high, thickness over half length 1/5 to 1/40 (u is proportional to it, X_m to its square, FiPy's cells to its
-    inverse).
-    """
-    errors = refine(_around, UPTAKE_ASPECTS, elements)
-    least_effluent = errors.pop("left")[-1]
-    record(studies(errors, {name: (2, THIN_SQUARE, 1e-3) for name in errors if name != "size"}),
-           at_most("acceptor leaving the starved one, over the supply", least_effluent, 0.02, "else none is starved"))
-
-
-def _around(aspect: float, elements: str) -> dict[str, float]:
-    """Largest difference for each Peclet number and density on one mesh, and the least acceptor at the outlet."""
-    seed = seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
-    differences = {"size": aspect, "left": 1.0}
-    for peclet, density in product(PECLETS, DENSITIES):
-        scene = thin_scene(elements, aspect, peclet * SCENE.substrates.acceptor.diffusivity / THICKNESS, density)
-        state = seed.with_body(active=scene.kinetics.maximum_density * seed.space.reaction.dx)
-        moment = strip_of(scene, state.outline.area, round(16 / aspect)).seed()
-        computed, expected = runs.along(state, solving.solve(scene, state), moment)
-        differences[f"Pe = {peclet:g}, X = {density:g} mg/L"] = np.abs(computed - expected).max() / 10.0
-        differences["left"] = min(differences["left"], computed[0, -1] / 10.0)
     return differences
 
 

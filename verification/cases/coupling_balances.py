@@ -12,15 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from repro.fem.walls import BOTTOM, FREE, TOP
+from repro.fem.walls import BOTTOM, FREE
 from repro.march.balance import Ledger
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model import meshing, remeshing, solving
+from repro.model import remeshing, solving
 from repro.model.contact_lines import CLOSE
 from repro.model.meshing import seeded
 from repro.model.remeshing import Remeshing
@@ -239,70 +236,6 @@ def test_one_balance(judge, arguments, record):
     record(judge(*arguments))
 
 
-#: Relative error that the presets promise in total; its factor in a single step.
-RIGHT = {"fast": 1e-2, "accurate": 1e-3, "exact": 1e-4}
-IN_A_STEP = 3.0
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-amounts", kind="property", mutants=("flows-of-the-start", "curved-rates-of-the-start"), runs_with="2",
-    omitted="paper has no tolerance of its steps")
-@parametrize(
-    "preset, end, *changes",
-    {"fast": ("fast", "19.4 h"), "accurate": ("accurate", "19.4 h"),
-     "exact": ("exact", "4 h", 'aggregate.radius="25 um"', "numerics.refinement=0.2"),
-     "fast, linear": ("fast", "19.4 h", runs.with_elements("linear"))})
-def test_amounts(preset, end, changes, record):
-    """The consumed amounts are those of ten times shorter steps: over the run to 1 % with the preset fast, 0.1 % with
-    accurate and 0.01 % with exact, and in every step to three times as much.
-
-    Norm: amounts of both substrates consumed over base, and in its worst step, over those of a run with a hundredth of
-    the tolerance and ten times as many steps, less 1; a cubic spline interpolates the cumulated amounts of that run at
-    the ends of the steps; exact: 4 h from a seed of 25 um, with elements as large as in fast.
-    """
-    scene = runs.base(end, runs.with_preset(preset), *changes)
-    tolerance = f"numerics.tolerance={scene.numerics.tolerance / 100}"
-    finer = runs.base(end, runs.with_preset(preset), *changes, tolerance)
-    (times, amounts), (fine, fine_amounts) = map(_cumulated, (scene, finer))
-    expected = CubicSpline(fine, fine_amounts)(times)
-    over_run = np.abs(amounts[-1] / expected[-1] - 1)
-    in_a_step = np.abs(np.diff(amounts, axis=0) / np.diff(expected, axis=0) - 1)
-    for k, name in enumerate(("acceptor", "donor")):
-        record(at_most(f"{name} over the run", over_run[k], RIGHT[preset], "the error that the preset promises"))
-        record(at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * RIGHT[preset],
-                       "three times the error that the preset promises"))
-    record(at_least("steps of the run with shorter steps, over these", len(fine) / len(times), 6.0,
-                    "tolerance to the power 1/2, ten; fewer if a step ends with the run"))
-
-
-def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of steps (n + 1,) h, and cumulated amounts of acceptor and donor consumed (n + 1, 2), from zero."""
-    ledgers = _ledgers(simulate(scene))
-    return (np.array([0.0, *(step.end for step in ledgers)]),
-            np.cumsum([(0.0, 0.0), *(step.consumed for step in ledgers)], axis=0))
-
-
-@pytest.mark.case(
-    "coupling-contact", kind="property", mutants=("films-stay-open", "reprojection-left-out"), runs_with="paper")
-@parametrize("*changes", runs.EVERY | {"exact": (runs.with_preset("exact"), "numerics.refinement=0.3")})
-def test_contact(changes, record):
-    """Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and the fluid
-    is cut in two.
-
-    Norm: three steps from an aggregate 0.1 um short of closing the pore, 20 um wide.
-    """
-    scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
-                      times=(0.2, 0.4, 0.6))
-    instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
-    rows, last = _ledgers(instants), instants[-1].pore
-    peclet = meshing.peclet(scene.substrates, scene.pore.width, runs.SPEED)
-    record(_steps(rows, last.space.count * max(1.0, 1 / peclet)), _area(scene, instants[-1]),
-           at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
-                    "2 um, or 16.7 degrees beside contact"),
-           between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug"))
-
-
 def _area(scene: Scene, last: Report, bound: float = 3e-6, origin: str = "J = theta to the stabilisation") -> Check:
     total = scene.kinetics.maximum_density * last.pore.outline.area
     return at_most("X_m times the area", abs(total / last.ledgers[-1].biomass_after - 1), bound, origin)
@@ -347,11 +280,3 @@ def _narrowest(scene: Scene, state, wall: int) -> float:
     gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
     allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
     return (gap[along > 0] / allowed[along > 0]).min()
-
-
-def _parts(mesh) -> int:
-    """Connected parts of the fluid."""
-    corners = mesh.triangles[~mesh.biomass]
-    links = (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel()))
-    labels = connected_components(coo_array(links, shape=2 * (len(mesh.points),)), directed=False)[1]
-    return len(np.unique(labels[corners]))

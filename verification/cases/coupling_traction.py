@@ -8,26 +8,20 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import simpson
 
-from reference import layered_channel
 from repro.fem.mesh import Mesh
-from repro.fem.outline import Outline
 from repro.fem.space import Space
 from repro.fem.walls import FREE
 from repro.march.simulation import simulate
 from repro.march.state import Report
-from repro.model import contact, flow, growth, mechanics, mesh_motion, solving, traction
-from repro.model.contact_lines import PATIENT
+from repro.model import contact, flow, growth, mechanics, solving, traction
 from repro.model.flow import Flow
-from repro.model.interface import LAPLACIAN, interface_of
+from repro.model.interface import interface_of
 from repro.model.mechanics import Mechanics, supports_of
 from repro.model.meshing import Meshing, seeded
 from repro.model.pore import Pore
-from repro.model.resistance import Viscous
-from verification.cases import flow as flow_cases
-from verification.evidence.cases import combined, parametrize
-from verification.evidence.checks import at_least, at_most, between, each_at_most, refine, studies, study
+from verification.evidence.cases import parametrize
+from verification.evidence.checks import at_least, at_most, between, each_at_most, study
 from verification.problems import runs
 
 FORMS = ("laplacian", "traction")
@@ -117,62 +111,6 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
     return total
 
 
-@pytest.mark.slow
-@pytest.mark.case(
-    "coupling-traction-layer", kind="exact", mutants=("traction-pressure-left-out", "traction-transposed-gradient"),
-    references=("layered_channel",))
-@parametrize("order", combined(flow_cases.ORDERS))
-def test_traction_layer(order, record):
-    """The shear that the fluid exerts on a layer of biomass is that of two viscous layers.
-
-    Norm: x-force on the middle of a layer of biomass, lambda = 2000, over the shear stress of two viscous layers, less
-    1, root mean square over random meshes of a size.
-    """
-    if order > 1:
-        record(at_most("shear", abs(_shear(Space(flow_cases.long_layer()))), 1e-5,
-                       "the elements contain both parabolas; remainder of the layer's ends"))
-        return
-    record(studies(refine(_shear_error, LAYER_DRAWS), {
-        "shear": (2, "forces as residuals of linear elements: second order, as the flux", 1e-3)}))
-
-
-#: Number of meshes of each level.
-LAYER_DRAWS = dict(enumerate((16, 12, 6, 2)))
-
-
-def _shear_error(level: int, draw: int) -> dict[str, float]:
-    return {"size": flow_cases.SIZES[level], "shear": _shear(Space(flow_cases.layer_grid(level, draw)))}
-
-
-def _shear(space: Space) -> float:
-    """Relative error of the mean shear on the middle of the layer."""
-    mesh = space.mesh
-    ratio = 2000.0
-    unit = flow.unit_flow(space, Viscous(ratio))
-    as_flow = Flow(1.0, unit.velocity, unit.pressure, unit.correction, 1.0, 1.0, 1.0)
-    forces = traction.nodal(space, as_flow, 1.0, LAPLACIAN)
-    along, across = mesh.points.T
-    line = np.flatnonzero((across == flow_cases.LAYER) & (np.abs(along) < flow_cases.LAYER_END))
-    x, shear = mesh.points[line, 0], forces[line, 0]
-    weight = np.clip((50 - np.abs(x)) / 10, 0, 1)  # level, then ramps: the sum is a tested integral
-    length = _tested(mesh, line, weight)
-    gradient = layered_channel.gradient(flow_cases.WIDTH, flow_cases.LAYER, ratio)
-    exact = gradient * (layered_channel.stress(flow_cases.WIDTH, flow_cases.LAYER, ratio) - flow_cases.LAYER)
-    return weight @ shear / length / exact - 1
-
-
-def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
-    """Integral of nodal values over a line of nodes.
-
-    It takes the trapezoidal rule, or Simpson's rule if every second node is a middle.
-    """
-    order = np.argsort(mesh.points[line, 0])
-    x, values = mesh.points[line[order], 0], weight[order]
-    if mesh.geometry == 1:
-        return np.trapezoid(values, x)
-    return simpson(values, x=x)
-
-
 @pytest.mark.case(
     "coupling-traction-base", kind="property", mutants=("density-squared", "forces-thousandfold"), runs_with="paper")
 @parametrize("*changes", runs.every(0.2, 0.6))
@@ -197,53 +135,10 @@ def _next_move(report: Report, *changes: str) -> float:
     return np.abs(pushed.mesh.points - plain.mesh.points).max() / plain.outline.thickness
 
 
-@pytest.mark.case(
-    "coupling-traction-even", kind="exact", mutants=("traction-pressure-left-out", "forces-pushed"), runs_with="paper")
-@parametrize("*changes", DEFAULT)
-def test_traction_even(changes, record):
-    """A uniform pressure of the fluid, five times mu_L, does not move the aggregate, which is incompressible; its P
-    changes by the pressure.
-
-    Norm: largest displacement of a node, over R; change of P over mu_L, less the pressure; forces at free nodes less
-    those of a uniform pressure, over the largest.
-    """
-    scene = loaded_scene(*changes)
-    seed = seeded(scene)
-    theta = _uneven(seed, 0.002)
-    mechanics = Mechanics.of(scene)
-    plain = contact.shape_under(mechanics, seed, [theta], seed, None, PATIENT).pore
-    space = seed.moved(mesh_motion.move(seed.mesh, plain.mesh.points[seed.mesh.body], 1.0)).space
-    mesh = space.mesh
-    at_rest = Flow(0.0, np.zeros((space.count, 2)), np.full(mesh.corners, 5.0), None, 0.0, 0.0, 0.0)
-    forces = traction.nodal(space, at_rest, 1.0, LAPLACIAN)
-    expected = -5.0 * _normals(plain.outline)
-    difference = (forces[mesh.loop] - expected)[plain.body.wall == FREE]
-    record(at_most("forces", np.abs(difference).max() / np.abs(expected).max(), 1e-12,
-                   "the divergence theorem: round-off"))
-    for sign in (1.0, -1.0):
-        pushed = contact.shape_under(mechanics, seed, [theta], seed, sign * forces[mesh.body], PATIENT).pore
-        difference = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
-        change = (pushed.pressure - plain.pressure)[mesh.topology.body_corners] + sign * 5.0
-        record(at_most(f"displacement, {sign:+g}", difference, 1e-9, "J = theta: Newton's tolerance"))
-        record(at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance"))
-
-
 def _uneven(seed: Pore, slope: float) -> np.ndarray:
     """(t, q) theta of a seed times 1.1 + slope x."""
     shape = seed.body.solid.shape
     return seed.body.theta * (1.1 + slope * seed.body.reference[shape.cells, 0] @ shape.table.values.T)
-
-
-def _normals(outline: Outline) -> np.ndarray:
-    """(M, 2) outward normals times edge length, shared between the nodes: the gradient of the area.
-
-    The area is a quadratic function of the positions, so central differences are exact.
-    """
-    def area(move):
-        return replace(outline, points=outline.points + move.reshape(-1, 2)).area
-
-    moves = np.eye(outline.points.size)
-    return np.array([area(move) - area(-move) for move in moves]).reshape(-1, 2) / 2
 
 
 FACTORS = (800.0, 400.0, 200.0, 100.0)

@@ -24,11 +24,12 @@ from repro.model.mechanics import Expansion, Mechanics
 from repro.model.meshing import seeded
 from repro.model.pore import Pore
 from repro.scene import load_scene
-from verification.cases.growth_codes import FRONT, _uneven
 from verification.evidence.cases import parametrize
 from verification.evidence.checks import around, at_most, between, refine
 from verification.problems import bodies, meshes
 
+#: theta on the wall at the front, X = -R_0, and its ratio to that at the rear.
+FRONT, CONTRAST = 36.0, 10.0
 #: Height of the opposite wall (um), the largest theta, and steps from the first contact to the end.
 HEIGHT, LARGEST, STEPS = 75.0, 1.5 * FRONT, 16
 WALLS = contact_growth.Walls(HEIGHT, 2.0, np.tan(np.radians(16.7)))
@@ -36,6 +37,12 @@ WALLS = contact_growth.Walls(HEIGHT, 2.0, np.tan(np.radians(16.7)))
 LEVELS = ((6, 3), (11, 5), (16, 6))
 #: First guess of the angles of the contact lines.
 GUESS = np.radians([100.0, 130.0])
+
+
+def _uneven(x, y):
+    """theta: 36 at the front, a tenth of it at the rear, and above half as much again as on the wall."""
+    along = CONTRAST ** (-0.5 * (x / bodies.RADIUS + 1))
+    return FRONT * along * (1 + 0.5 * (y / bodies.RADIUS) ** 2)
 
 
 @cache

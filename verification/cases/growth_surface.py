@@ -189,7 +189,7 @@ def test_surface_stability(record):
 
 @pytest.mark.slow
 @pytest.mark.case(
-    "growth-fold", kind="exact", mutants=("fold-never",),
+    "growth-fold", kind="exact", mutants=("fold-never", "biot-of-a-layer"),
     omitted="orders of elements by themselves: growth-surface-confined; accurate, exact: as fast")
 @pytest.mark.parametrize("preset", ["paper", "fast"])
 def test_fold(preset, record):

@@ -232,7 +232,7 @@ FAST = HardCase(
     {**{f"velocity x {factor}": partial(fast_flow, factor=factor) for factor in (1, 10, 100, 1000)},
      "velocity x 100, growing": partial(fast_growth, factor=100)},
     refusable=("velocity x 1000",),
-    mutants=("layers-ignored",))
+    mutants=("cross-flow-sign",))
 
 
 def no_flow(preset: str) -> list:

@@ -1,17 +1,15 @@
 """Motion of straight and curved meshes with the aggregate.
 
-Some motions have a known displacement of the fluid. The fluid around an aggregate on a wall is compared with quadratic
-elements without a pressure on their own meshes. Every motion keeps triangles upright and nodes on their lines, and can
-be reversed. The criterion for a remesh is exact.
+Some motions have a known displacement of the fluid. Every motion keeps triangles upright and nodes on their lines, and
+can be reversed. The criterion for a remesh is exact.
 """
 
 from functools import cache
-from itertools import product
 
 import numpy as np
 import pytest
 
-from reference import quadratic_mesh_motion, sliding_waves
+from reference import sliding_waves
 from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
 from repro.fem.walls import channel_walls
@@ -138,49 +136,8 @@ def _wave_error(size: float, seed: int, gamma: float, geometry: int, label: str)
 
 
 RADIUS = 25.0
-#: Width of the pore, and its ends (um).
-PORE, DISC_END = 50.0, 50.0
-#: Refinements of the package's mesh with the divisions of the reference. Both codes are refined.
-LEVELS = ((0.7, 6), (1.1, 8), (1.9, 12), (3.3, 16))
-WHY = "linear elements: second order, no singular corner (mirror images); 0.1 % between codes"
-DISC_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y: np.array([RADIUS + 0 * x, 0 * y])}
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "mesh_motion-half-disc", kind="cross-code", mutants=("gamma-sign", "twice-the-divergence", "gamma-inverted"),
-    references=("quadratic_mesh_motion",))
-@parametrize("geometry", EITHER)
-def test_half_disc(geometry, record):
-    """Around a half-disc that grows, or slides along the wall, the displacement of the fluid is that of an independent
-    code, for three gamma, on straight triangles and on curved ones; both codes are refined.
-
-    Norm: L2 of the difference of the whole displacement over that of the displacement.
-    """
-    for name, gamma in product(DISC_MOTIONS, GAMMAS):
-        differences = refine(_difference, LEVELS, geometry, gamma, name)
-        record(study(f"{name}, gamma = {gamma:g}", differences["size"], differences["apart"], 2, WHY, ceiling=1e-3))
-
-
-#: Cached: straight and curved triangles share the reference, and several motions a mesh.
-_reference_motion, _disc = cache(quadratic_mesh_motion.follow), cache(meshes.half_disc)
-
-
-def _difference(level: tuple[float, int], geometry: int, gamma: float, name: str) -> dict[str, float]:
-    """Element size, and relative difference of both codes on a level.
-
-    The displacement is linear in the motion, which may be as large as the aggregate.
-    """
-    refinement, parts = level
-    grid = _disc(RADIUS, refinement, (-DISC_END, DISC_END), PORE, geometry=geometry)
-    motion = DISC_MOTIONS[name]
-    reference = _reference_motion(RADIUS, PORE, DISC_END, parts, gamma, motion)
-    moved_by = moved(grid, grid.points + motion(*grid.points.T).T, gamma) - grid.points
-    computed = meshes.field_at(Space(grid), moved_by, reference.points)
-    return {"size": meshes.mean_size(grid),
-            "apart": meshes.relative(computed, reference.displacement, reference.weights)}
-
-
+#: Width of the pore (um).
+PORE = 50.0
 REACH = -75.0, 75.0
 #: Radius of the half-disc (um), factor of its area, and distance that it slides over its radius.
 JOURNEYS = ((5.0, 2.0, 1.0), (20.0, 2.0, 1.0), (35.0, 1.3, 0.5))
@@ -188,8 +145,7 @@ STEPS = 18
 
 
 @pytest.mark.case(
-    "mesh_motion-growth", kind="property", mutants=("stale-fluid", "outlet-moves"),
-    references=("quadratic_mesh_motion",))
+    "mesh_motion-growth", kind="property", mutants=("stale-fluid", "outlet-moves"))
 @parametrize("geometry", EITHER, slow=["straight"])
 def test_growth(geometry, record):
     """If a half-disc doubles its area or slides by its radius in 18 steps (under a narrow film: grows by 30 % or slides
@@ -238,8 +194,7 @@ STRIDES = (0.08, 0.04, 0.02, 0.01)
 
 
 @pytest.mark.case(
-    "mesh_motion-round-trip", kind="property", mutants=("stale-forms", "stale-fluid"),
-    references=("quadratic_mesh_motion",))
+    "mesh_motion-round-trip", kind="property", mutants=("stale-forms", "stale-fluid"))
 @parametrize("geometry", EITHER)
 def test_round_trip(geometry, record):
     """After a motion and its reverse the nodes return to second order in the length of the motion, because the reverse

@@ -14,7 +14,7 @@ import pytest
 from repro.fem.walls import FREE
 from repro.model.transport import Concentrations
 from verification.evidence.cases import parametrize
-from verification.evidence.checks import at_least, at_most, columns, each_at_most, largest, refine, studies
+from verification.evidence.checks import at_least, at_most, columns, each_at_most, largest
 from verification.problems import aggregates, meshes, runs
 from verification.problems.channels import NAMES, both, pair
 from verification.problems.schemes import exchange
@@ -175,9 +175,6 @@ def _missing(state) -> float:
 
 #: A linear motion that keeps the lower wall; det = 1.17.
 MOTION = np.array([[1.3, 0.2], [0.0, 0.9]])
-ROUND, REFINEMENTS = 20.0, (0.75, 1.3, 2.3, 4.0)
-#: Refinement of the old mesh over that of the new one: three unrelated pairs of meshes a size.
-OLD = (0.7, 0.8, 0.9)
 #: Transfers that a scene may have, by the order of its elements.
 TRANSFERS = {1: ("conserving", "linear"), 2: ("conserving",)}
 #: Changes of a scene by its transfer.
@@ -242,87 +239,6 @@ def _moved_linearly(order: int, kinds: dict):
     pressure = np.zeros(moved.mesh.corners)
     pressure[inside] = _plane(PRESSURE, *moved.mesh.points[inside].T)
     return replace(moved.with_body(**masses), pressure=pressure)
-
-
-@pytest.mark.slow
-@pytest.mark.case(
-    "reprojection-remesh-order", kind="manufactured", mutants=("theta-without-density", "corners-for-middles"))
-@parametrize("order", aggregates.EVERY)
-def test_remesh_order(order, record):
-    """A remesh transfers a smooth density to second order, and with quadratic elements a smooth share of X_I. The next
-    update returns the density to X_m to second order, and the area to the biomass over X_m exactly.
-
-    Norm: L2 of the density on the new mesh less the exact one, and of the density over X_m less one after an update
-    without growth, relative, root mean square over three pairs of meshes a size; area after that update, relative.
-    """
-    if order > 1:
-        record(studies(refine(_share_errors, dict.fromkeys(SHARED, len(OLD)), order),
-                       {"share of X_I after the remesh": (2, FITTED, 7e-4)}))
-        return
-    rows = refine(_density_errors, dict.fromkeys(REFINEMENTS, len(OLD)))
-    record(studies(rows, {"density after the remesh": (2, "linear elements: second order", 1.5e-4),
-                          "density after the update": (
-                              2, "mean over triangles for value at nodes: second order", 5e-4)}))
-    record(at_most("area after the update, over biomass / X_m", rows["area"].max(), 1e-12,
-                   "theta sums to the biomass: round-off"))
-    record(at_least("density over X_m less one, before it", rows["before"].min(), 0.03, "else nothing is restored"))
-
-
-#: Refinements of curved meshes.
-SHARED = (0.6, 1.0, 1.7, 3.0)
-FITTED = "a linear fit in each triangle, averaged at the nodes: second order"
-
-
-def _share(x, y):
-    """X_I over X_m, 0.2 +- 0.1, with zero slope across the rim and the wall."""
-    return 0.2 + 0.1 * np.cos(np.pi * np.hypot(x, y) / ROUND)
-
-
-def _share_errors(refinement: float, number: int, order: int) -> dict[str, float]:
-    """Errors of a pair of meshes at the points of the reaction."""
-    before = _round(refinement, OLD[number], lambda x, y: aggregates.DENSITY * (1 - _share(x, y)), order)
-    weight = before.space.reaction.dx
-    inert = aggregates.DENSITY * _share(*aggregates.reaction_points(before.space)) * weight
-    before = before.with_body(inert=inert)
-    after = _remeshed(refinement, before)
-    weight, exact = after.space.reaction.dx, _share(*aggregates.reaction_points(after.space))
-    computed = after.inert / weight / aggregates.DENSITY
-    return {"size": _size(after), "share of X_I after the remesh": meshes.relative(computed, exact, weight)}
-
-
-def _size(state) -> float:
-    """Element size (um) in the aggregate."""
-    return meshes.mean_size(state.mesh, state.mesh.biomass)
-
-
-def _hump(x, y):
-    """X_A, X_m +- 5 %, with zero slope across the rim and the wall."""
-    return aggregates.DENSITY * (1 + 0.05 * np.cos(np.pi * np.hypot(x, y) / ROUND))
-
-
-def _round(refinement: float, old: float, density, order: int = 1):
-    """A half-disc with a density (x, y) on a mesh coarser than the next one."""
-    outline = meshes.seed(ROUND, refinement, order)
-    return aggregates.seed_around(outline, old * refinement, density, (-30.0, 30.0), order)
-
-
-def _remeshed(refinement: float, before):
-    return aggregates.remesh(aggregates.base_scene(f"numerics.refinement={refinement}", 'pore.length="60 um"',
-                                                order=before.space.order), before)
-
-
-def _density_errors(refinement: float, number: int) -> dict[str, float]:
-    """Errors after the remesh of a pair of meshes, and after the next update."""
-    new = _remeshed(refinement, _round(refinement, OLD[number], _hump))
-    after, area = aggregates.expand(aggregates.base_scene(), new, 0.0), new.mass / aggregates.DENSITY
-    return {"density after the remesh": _density_error(new, _hump), "density after the update": _density_error(after),
-            "before": _density_error(new), "area": abs(after.outline.area / area - 1), "size": _size(new)}
-
-
-def _density_error(state, exact=aggregates.uniform) -> float:
-    """Relative L2 error of the density against exact(x, y), by default X_m."""
-    active, _ = aggregates.densities(state)
-    return meshes.l2_error(state.mesh.points[state.mesh.body], state.mesh.topology.body_cells, active[:, 0], exact)
 
 
 @pytest.mark.case(

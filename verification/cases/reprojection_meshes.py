@@ -1,4 +1,4 @@
-"""Accuracy of transfers between meshes: one transfer of a smooth field, and forty of a steep one.
+"""Accuracy of transfers between meshes: one transfer of a smooth field.
 
 The common pieces of two meshes, and the projection integrated over them, are compared with shapely's pieces.
 """
@@ -10,21 +10,13 @@ from reference import galerkin_transfer
 from repro.fem import transfer
 from repro.fem.mesh import triangle_areas
 from verification.evidence.cases import parametrize
-from verification.evidence.checks import at_least, at_most, columns, each_at_most, largest, refine, studies
+from verification.evidence.checks import each_at_most, largest, refine, studies
 from verification.problems import meshes, pairs, runs
 
 SIZES = dict.fromkeys((5.0, 2.5, 1.25, 0.625), 3)
-REMESHES = 40
-
-
 def smooth(x, y):
     """About two waves over the rectangle."""
     return 2 + np.sin(0.3 * x) * np.cos(0.2 * y)
-
-
-def steep(x, y):
-    """A hill with values from 0 to 1, twenty times narrower than the domain."""
-    return np.exp(-((x - 18) ** 2 + (y - 10) ** 2) / 6)
 
 
 #: The reason why transfers of fields run with linear elements alone.
@@ -67,42 +59,6 @@ def test_order(field, measure, method, expected, record):
     size; root mean square error at a thousand places of fields of order 1 and 2, and over three meshes a size.
     """
     record(studies(refine(measure, SIZES, method), {field: expected}))
-
-
-@pytest.mark.case("reprojection-chain", kind="property", mutants=("linear-transfer",), runs_with="1", omitted=MASSES)
-def test_chain(record):
-    """Over forty remeshes of a steep field, projection keeps its integral to round-off and never raises the integral of
-    its square. Linear interpolation keeps the field within its bounds and changes its integral.
-
-    Norm: change of the integral of a steep field over 40 remeshes, and of its square in each, relative; largest and
-    least nodal value.
-    """
-    projected, paper = (_remesh_history(carry, steep) for carry in (transfer.project, transfer.interpolated))
-    rise = (projected["square"][1:] / projected["square"][:-1]).max()
-    record(at_most("integral by projection", largest(projected["integral"] - 1), 1e-12, "round-off"))
-    record(at_most("square by projection, after over before", rise, 1.0, "a projection raises no norm"))
-    record(at_most("largest value by interpolation", paper["largest"].max(), paper["largest"][0],
-                   "weights between 0 and 1"))
-    record(at_least("least value by interpolation", paper["least"].min(), paper["least"][0], "weights between 0 and 1"))
-    record(at_least("integral by interpolation, change", abs(paper["integral"][-1] - 1), 0.02,
-                    "it does not conserve, and the case detects this"))
-
-
-def _remesh_history(carry, field) -> dict[str, np.ndarray]:
-    """History of a field over the remeshes (k + 1,).
-
-    It has the integral over the first one, the integral of the square, and the least and largest values.
-    """
-    grids = [pairs.grid(2.0, 1), pairs.grid(2.0, 2), pairs.grid(2.4, 3)]
-    mesh, rows = grids[0], []
-    values = field(*mesh[0].T)[:, None]
-    for k in range(REMESHES + 1):
-        rows.append({"integral": pairs.integral(mesh, values[:, 0]), "square": pairs.square(mesh, values[:, 0]),
-                     "least": values.min(), "largest": values.max()})
-        new = grids[(k + 1) % 3]
-        mesh, values = new, carry(*mesh, values, *new)
-    history = columns(rows)
-    return {**history, "integral": history["integral"] / history["integral"][0]}
 
 
 ROUND_OFF = "round-off; over eight pairs of meshes"

@@ -199,24 +199,6 @@ SOLVED = {"fast": ((FAST, "numerics.refinement=0.25"), 1e-2), "accurate": ((FAST
 HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L", "1e-5 mg/L")}
 
 
-@pytest.mark.case("transport-proportion", kind="property", mutants=("unpaired",), runs_with="2 paper")
-@parametrize("half, solved", combined({"K_s = 1e-2 mg/L": "1e-2 mg/L"}, SOLVED))
-def test_proportion(half, solved, record):
-    """Behind a front where the donor is used up, at half saturations of a hundredth of its supply, both are taken up in
-    their proportion, with linear and quadratic elements.
-
-    Norm: consumed acceptor over F times consumed donor, less one.
-    """
-    record(proportion(half, *solved[0]))
-
-
-def proportion(half: str, *numerics: str) -> Check:
-    """Check consumed acceptor over F times consumed donor."""
-    acceptor, donor = _front(half, *numerics)
-    ratio = acceptor.consumed / donor.consumed / SCENE.kinetics.acceptor_to_donor_ratio
-    return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact to Newton's tolerance")
-
-
 @pytest.mark.slow
 @pytest.mark.case("transport-curved-front", kind="property", mutants=("unpaired",), runs_with="2 paper")
 @parametrize("half, solved", combined(HALVES, SOLVED))
@@ -229,8 +211,9 @@ def test_curved_front(half, solved, record):
     mesh of refinement 1.3.
     """
     numerics, bound = solved
-    record(proportion(half, *numerics))
     coarse, fine = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
+    ratio = coarse[0].consumed / coarse[1].consumed / SCENE.kinetics.acceptor_to_donor_ratio
+    record(at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact to Newton's tolerance"))
     difference = max(abs(a.effluent - b.effluent) for a, b in zip(coarse, fine)) / SUPPLY
     record(at_most("effluents", difference, bound, "the error that the preset promises"))
 
@@ -292,30 +275,6 @@ def test_curved_peclet(speed, preset, record):
     for name, flux, expected in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), finer):
         record(each_at_most({"effluent": abs(flux.effluent - expected.effluent) / SUPPLY,
                              "consumed": abs(flux.consumed / expected.consumed - 1)}, bound, why, f" {name}"))
-
-
-#: Numerics, bound of the balance, and bound of the difference of effluents from quadratic elements twice finer.
-CONSERVES = 1e-11, "round-off: the form conserves"
-HALF_DISCS = {
-    "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "the others are compared with this solution"),
-    "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, the error that preset paper promises"),
-    "fast": ((FAST,), CONSERVES, 1e-3, TENTH),
-    "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of the error that preset accurate promises")}
-
-
-@pytest.mark.case("transport-curved-half-disc", kind="property", mutants=("outlet-forgotten",))
-@parametrize("numerics, round_off, bound, why", HALF_DISCS)
-def test_curved_half_disc(numerics, round_off, bound, why, record):
-    """Around a half-disc each substrate is in balance to round-off, and the effluents of the presets are those of
-    quadratic elements on a mesh twice finer within their errors.
-
-    Norm: (in - out - consumed) over in; difference over the supply to quadratic concentrations.
-    """
-    finer = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
-    for name, flux, expected in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), finer):
-        record(at_most(f"balance, {name}", abs(_defect(flux)), *round_off))
-        if bound:
-            record(at_most(f"effluent, {name}", abs(flux.effluent - expected.effluent) / SUPPLY, bound, why))
 
 
 #: Lengths of a step (h); X_A more than doubles in the last.

@@ -25,8 +25,8 @@ ONE_BY_ONE = "other presets: their elements, by themselves"
 #: Why cases of a stage that run with accurate do not run with exact, unless the case gives its own reason.
 SAME = "exact: the elements and the order of accurate"
 EXACT = {"flow": SAME, "transport": SAME,
-         "hard": "exact: the scheme of accurate, and some times slower; its contact and remeshes: coupling-contact, "
-                 "coupling-ledger"}
+         "hard": "exact: the scheme of accurate, and some times slower; its contact and remeshes: "
+                 "growth-gold-contact, coupling-ledger"}
 #: A line of the table: sections and words, equations, modules, and a remark.
 LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, (?:repro)?\.\w+)*)(?:[: ].*)?$")
 #: The sections at the start of its first part: "3.1, 3.5", "2.1-2.3".

@@ -113,10 +113,6 @@ def half_disc_space(radius: float, refinement: float, ends, width: float, order:
 #: The least distance of a node from the curve over the element size. It exceeds 0.5 because edges on the curve are a
 #: little shorter than an element.
 CURVE_CLEARANCE = 0.6
-#: The package's mesher is not random, so unrelated meshes of about one size have slightly different refinements.
-SPREAD = (1.0, 0.9, 1.1)
-
-
 def cut(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
     """A rectangle cut by the lines x in ``across`` and y in ``along``, with ``is_biomass(x, y)`` of the middles."""
     points, _ = rectangle(ends, width, size, across=across, along=along, seed=seed)
@@ -230,11 +226,6 @@ def field_at(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
     nodes give their numbers. Raises ValueError if a point lies elsewhere.
     """
     return _values_at(space.mesh, space.order, space.points, values, where)
-
-
-def pressure_at(mesh: Mesh, values: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """:func:`field_at` for a field (corners,) that is linear in each triangle."""
-    return _values_at(mesh, 1, mesh.points[: mesh.corners], values, where)
 
 
 def _values_at(mesh: Mesh, order: int, points: np.ndarray, values: np.ndarray, where: np.ndarray) -> np.ndarray:

@@ -10,7 +10,6 @@ from verification.problems import meshes
 from verification.problems.meshes import upright
 
 ENDS, WIDTH = (0.0, 40.0), 25.0
-AREA = (ENDS[1] - ENDS[0]) * WIDTH
 #: Displacements (um) of nodes, and the distance (um) of nodes from the rim that makes slivers of this width.
 ASIDE, SLIVER = (1e-14, 1e-9, 1e-4), 1e-6
 Grid = tuple[np.ndarray, np.ndarray]
