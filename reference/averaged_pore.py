@@ -11,8 +11,8 @@ u of the open channel, the flux u W is the same everywhere and the loss is the i
 
     (u W C)' = ((D (W - h) + D_B h) C')' - X h q(C_A, C_D),   u W C - D W C' = u W C_s at -L/2,   C' = 0 at L/2
 
-in FiPy's finite volumes (FiPy's outlet passes nothing unless the gradient is constrained there). The uptake is added
-cell by cell, and Newton's method solves the equations.
+in FiPy's finite volumes, as in :mod:`reference.channel_fipy` (FiPy's outlet passes nothing unless the gradient is
+constrained there). The uptake is added cell by cell, and Newton's method solves the equations.
 
 *Growth.* a and i are X_A and X_I in the material of a cell, over X_m and per volume at t = 0: a' = a r_A(C),
 i' = a r_I(C), (9)-(10), in the mean over the aggregate; its area grows by theta = a + i. An aggregate that keeps its
@@ -26,12 +26,13 @@ from functools import cache, partial
 
 import numpy as np
 import scipy.sparse as sp
-from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, Grid1D
+from fipy import CentralDifferenceConvectionTerm, Grid1D
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 from scipy.sparse.linalg import spsolve
 
 from reference import layered_channel
+from reference.channel_fipy import diffusion, matrix
 from reference.monod import derivatives, sink_derivative, uptake
 
 TOLERANCE, MAX_ITERATIONS = 1e-13, 50
@@ -70,6 +71,13 @@ class AveragedState:
     ends: tuple[float, float]
 
 
+def half_ellipse(half_length, thickness, cells):
+    """(lengths (n,), mean heights (n,)) of equal cells of a half-ellipse around x = 0. The area is exact."""
+    s = np.linspace(-1.0, 1.0, cells + 1)
+    below = 0.5 * (s * np.sqrt(1 - s**2) + np.arcsin(s))
+    return half_length * np.diff(s), thickness * np.diff(below) / np.diff(s)
+
+
 class Section:
     """One geometry: an aggregate of cells ``lengths`` and ``heights`` (n,) that starts at x = left, and ``fluid`` equal
     cells upstream and downstream of it."""
@@ -93,8 +101,7 @@ class Section:
     def _diffusion_matrix(self, water, biomass):
         """FiPy's matrix of diffusion."""
         section = water * (self.pore.width - self.heights) + biomass * self.heights
-        diffusion = DiffusionTerm(coeff=CellVariable(mesh=self.mesh, value=section).harmonicFaceValue)
-        return _matrix(-diffusion, self.mesh)
+        return matrix(-diffusion(self.mesh, section), self.mesh)
 
     def steady(self, active, start=None):
         """Steady concentrations (2, n); active: X_A of the aggregate's cells (K,); start: the first iterate."""
@@ -122,19 +129,10 @@ class Section:
         return (self.source - sinks).ravel() - self.transport @ fields.ravel(), size
 
 
-def _matrix(term, mesh):
-    """FiPy's matrix of a term; the gradient at the outlet is zero."""
-    field = CellVariable(mesh=mesh, value=1.0)
-    field.faceGrad.constrain([0.0], where=mesh.facesRight)
-    term.cacheMatrix()
-    term.justResidualVector(var=field)
-    return sp.csr_matrix(term.matrix.matrix)
-
-
 @cache
 def _unit_flux(cells):
     """FiPy's matrix of advection by a flux of one. Central differences do not use the cells' lengths."""
-    return _matrix(CentralDifferenceConvectionTerm(coeff=(1.0,)), Grid1D(nx=cells, dx=1.0))
+    return matrix(CentralDifferenceConvectionTerm(coeff=(1.0,)), Grid1D(nx=cells, dx=1.0))
 
 
 class Averaged:

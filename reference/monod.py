@@ -9,6 +9,8 @@ import scipy.sparse as sp
 
 #: Step of the central differences of the uptake, mg/L.
 DIFFERENCE_STEP = 1e-6
+#: Newton's method stops with an error after this number of steps.
+MAX_ITERATIONS = 100
 
 
 def uptake(acceptor, donor, rates):
@@ -34,3 +36,19 @@ def sink_derivative(fields, load, rates):
     """Derivative of :func:`sink`, (2n, 2n), point by point."""
     rows = load * derivatives(fields.reshape(2, -1), rates)
     return sp.block_array([[*map(sp.diags_array, row)] for row in rows], format="csc")
+
+
+def solve_steady(balance, derivative, fields, tolerance, solve_linear):
+    """Find the zero (n,) of ``balance`` by Newton's method with halved steps from ``fields`` (n,).
+
+    solve_linear(matrix, right) solves the linear systems. Raises RuntimeError if Newton's method does not converge."""
+    for _ in range(MAX_ITERATIONS):
+        defect = balance(fields)
+        if np.abs(defect).max() < tolerance:
+            return fields
+        step = solve_linear(derivative(fields), -defect)
+        length = 1.0
+        while np.linalg.norm(balance(fields + length * step)) > np.linalg.norm(defect) and length > 1e-3:
+            length /= 2
+        fields = fields + length * step
+    raise RuntimeError(f"the steady concentrations did not converge: residual {np.abs(defect).max():.2g}")

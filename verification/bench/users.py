@@ -5,8 +5,8 @@
 with u = 0 and the supply at both ends, or with (11)-(12) there. FiPy solves the coupled equations with a direct solver.
 The uptake is linearised as its manual recommends (Newton's method). py-pde integrates to the steady state in explicit
 Euler steps compiled by numba; its adaptive Runge-Kutta method took longer. An expert's method uses the matrix of
-py-pde's Laplacian in Newton's method (:mod:`verification.bench.finite_differences`). This package solves its transport
-on right triangles that halve the square cells of their grids.
+py-pde's Laplacian in Newton's method (:mod:`reference.diffusion_reaction_pypde`). This package solves its transport on
+right triangles that halve the square cells of their grids.
 """
 
 from collections.abc import Callable
@@ -27,6 +27,7 @@ from pde import PDE, CallbackTracker, CartesianGrid, Controller, EulerSolver, Fi
 from skfem import Basis, ElementTriP2, MeshTri, asm
 
 from reference import channel_bvp
+from reference import diffusion_reaction_pypde as pypde
 from reference.monod import derivatives, uptake
 from reference.whole_run import Pore
 from reference.whole_run_pore import steady, stiffness
@@ -35,7 +36,6 @@ from repro.fem.walls import channel_walls
 from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.scene import load_scene
-from verification.bench.finite_differences import Box
 from verification.bench.record import clock, measured
 from verification.problems import channels, meshes
 from verification.problems.pairs import upright
@@ -269,7 +269,7 @@ def box_part() -> dict:
 
 
 def _newton(cells: int) -> np.ndarray:
-    box = Box(cells, HALF, WIDTH, SIDE, SIDE)
+    box = pypde.Box(cells, HALF, WIDTH, pypde.block(SIDE, SIDE))
     fields = box.steady(DIFFUSIVITY, SUPPLY, DENSITY, RATES)
     return BOX.judged(fields, DENSITY * box.part * (WIDTH / cells) ** 2)
 

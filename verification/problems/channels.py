@@ -31,18 +31,21 @@ from verification.problems.schemes import scheme_on
 SCENE = load_scene("base")
 WIDTH, SLAB = 10.0, 40.0
 NAMES = ("acceptor", "donor")
+HEIGHTS = 5
 #: Under plug flow the slab is 0 < x < SLAB; without flow |x| < SLAB, between films of fluid of thickness FILM or none.
 CROSSED, FILM = (-20.0, 60.0), 20.0
 #: Ends of the channel with more fluid, for order 2.
 WIDE = (-40.0, 80.0)
 #: Element sizes (um) and the number of meshes of each. Coarse meshes are cheap and scatter most.
 SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}
+FINEST = min(SAMPLES)
 SECOND = "linear elements, lumped reaction: second order"
 WORDS = {1: "linear", 2: "quadratic"}
 #: Every order, by its word.
 ORDERS = {word: order for order, word in WORDS.items()}
-#: Expected orders of concentrations in L2, and their reasons.
+#: Expected orders and their reasons: concentrations in L2, and effluents and uptake (twice the order of the gradient).
 EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2")}
+FUNCTIONAL = {1: (2, SECOND), 2: (4, "twice the order of the gradient: fourth")}
 #: Degree of the quadrature in which errors are integrated.
 DEGREE = 6
 
@@ -149,6 +152,13 @@ def rms_errors(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.
     truth = np.asarray(exact(*np.moveaxis(where, 2, 0)))
     gap = fields[:, space.cells] @ values.T - truth
     return tuple(np.sqrt(np.sum(weight * part**2, axis=(1, 2)) / weight.sum()) for part in (gap, truth))
+
+
+def at_heights(space: Space, fields: np.ndarray, x) -> np.ndarray:
+    """(..., HEIGHTS, n) values of fields (..., count) at x (n,) and HEIGHTS heights."""
+    y = WIDTH * (np.arange(HEIGHTS) + 0.5) / HEIGHTS
+    where = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return meshes.field_at(space, fields.T, where).T.reshape(*fields.shape[:-1], HEIGHTS, -1)
 
 
 def box_errors(grid: Mesh, order: int, ratio: float, interface: str, exact: Callable) -> dict[str, float]:

@@ -2,23 +2,22 @@
 
     D lap C = X q(C_A, C_D),   C = supply at x = -a and x = a,   no flux through y = 0 and y = W
 
-on a Cartesian grid of square cells. The biomass is the block |x| < half, y < height. D is the same in fluid and
-biomass, so that py-pde's Laplacian L C + g applies. Its matrix follows from applying it to zero and to five
+on a Cartesian grid of square cells. The uptake of a cell is proportional to its fraction of biomass. D is the same in
+fluid and biomass, so that py-pde's Laplacian L C + g applies. Its matrix follows from applying it to zero and to five
 patterns; no two cells of a pattern are neighbours of the same cell. Newton's method solves for both substrates with
 this matrix. Nothing is compiled.
 
-The scheme is of second order, because the biomass's sides follow the cells.
+The scheme is of second order if the biomass's sides follow the cells. A curved side cuts cells: the fractions keep the
+amount of uptake correct, but shift its location by a fraction of a cell.
 """
 import numpy as np
 import scipy.sparse as sp
 from pde import CartesianGrid, ScalarField
 from scipy.sparse.linalg import splu
 
-from reference.monod import sink, sink_derivative
+from reference.monod import sink, sink_derivative, solve_steady
 
 TOLERANCE = 1e-11
-#: Newton's method stops with an error after this number of steps.
-MAX_ITERATIONS = 100
 #: Options of SuperLU: the diagonal dominates, and pivoting would destroy the ordering.
 NO_PIVOTS = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 #: Number of patterns. The five cells of the stencil have different values of x + 2 y modulo five.
@@ -26,15 +25,18 @@ PATTERNS = 5
 
 
 class Box:
-    """``cells`` across the width of [-a, a] x [0, W]; points (n, 2): their centres; part (n,): 1 in the biomass."""
+    """``cells`` across the width of [-a, a] x [0, W]; points (n, 2): their centres.
 
-    def __init__(self, cells, half_length, width, half, height):
+    part: (n,) -> function (points (n, 2), cell's side) -> the part of each cell that is biomass.
+    """
+
+    def __init__(self, cells, half_length, width, part):
         count = 2 * half_length * cells / width
         if round(count) != count:
             raise ValueError("the length must be a whole number of cells")
         self.grid = CartesianGrid([[-half_length, half_length], [0.0, width]], [round(count), cells])
         self.points = np.array(self.grid.cell_coords).reshape(-1, 2)
-        self.part = ((np.abs(self.points[:, 0]) < half) & (self.points[:, 1] < height)).astype(float)
+        self.part = part(self.points, width / cells)
 
     def _laplacian(self, supply):
         """(L, g) of py-pde's Laplacian L C + g with C = supply at both ends."""
@@ -68,14 +70,21 @@ class Box:
         def balance(fields):
             return matrix @ fields + constant - sink(fields, load, rates)
 
-        fields = np.repeat(np.array(supply, float), len(self.points))
-        for _ in range(MAX_ITERATIONS):
-            defect = balance(fields)
-            if np.abs(defect).max() < TOLERANCE * np.abs(constant).max():
-                return fields.reshape(2, -1)
-            step = splu(matrix - sink_derivative(fields, load, rates), **NO_PIVOTS).solve(-defect)
-            length = 1.0
-            while np.linalg.norm(balance(fields + length * step)) > np.linalg.norm(defect) and length > 1e-3:
-                length /= 2
-            fields = fields + length * step
-        raise RuntimeError(f"the steady concentrations did not converge: residual {np.abs(defect).max():.2g}")
+        start = np.repeat(np.array(supply, float), len(self.points))
+        return solve_steady(balance, lambda fields: matrix - sink_derivative(fields, load, rates), start,
+                            TOLERANCE * np.abs(constant).max(),
+                            lambda system, right: splu(system, **NO_PIVOTS).solve(right)).reshape(2, -1)
+
+
+def half_disc(radius, parts=16):
+    """The part of each cell within a disc around the origin, by ``parts`` x ``parts`` points."""
+    def part(points, cell):
+        offsets = cell * ((np.arange(parts) + 0.5) / parts - 0.5)
+        return np.mean([np.hypot(points[:, 0] + a, points[:, 1] + b) < radius for a in offsets for b in offsets],
+                       axis=0)
+    return part
+
+
+def block(half, height):
+    """|x| < half, y < height: both must be whole numbers of cells."""
+    return lambda points, cell: ((np.abs(points[:, 0]) < half) & (points[:, 1] < height)).astype(float)
