@@ -137,13 +137,7 @@ def refined(mesh: Mesh, outlines: Sequence[Outline],
     Returns
     -------
     Bisection
-
-    Raises
-    ------
-    MeshError
-        If a triangle is turned over. Its bisection would not end.
     """
-    mesh.checked()
     unit = elements.nodes(1)
     parts = _Parts(mesh.points[: mesh.corners], mesh.triangles, np.arange(len(mesh.triangles)),
                    np.tile(unit, (len(mesh.triangles), 1, 1)), {})
