@@ -160,7 +160,8 @@ class BalanceError(StageError):
 class RunEnd(Exception):
     """The model ends before ``growth.end``: an end of :mod:`repro.march.ends`. No failure.
 
-    Its message has the time, as "t = 3.5 h": the status of a run shows by it that the run is over.
+    Its message contains the time, for example "t = 3.5 h". The status of a run repeats the message,
+    and a status with a time says that the run is over.
     """
 
 

@@ -616,7 +616,7 @@ def test_a_trial_starts_from_a_shape_in_which_no_triangle_is_turned_over():
     scene = load_scene("base", ['numerics.preset="fast"'])
     seed = seeded(scene)
     closing = ByLines(Mechanics.of(scene), seed, seed, None, PATIENT)
-    closing._shapes = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
+    closing._trials = [(np.zeros(2), seed.mesh.points * [-1.0, 1.0], seed.pressure)]
     assert np.array_equal(closing._first(seed, None, np.zeros(2)).mesh.points, seed.mesh.points)
 
 

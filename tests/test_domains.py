@@ -55,7 +55,7 @@ def test_contact_lines_from_a_triangle_that_is_turned_over_fail_in_growth():
     place = partial(closing._place, grown, grown.body.wall, lines)
     with pytest.raises(GrowthError, match=OUT_OF_DOMAIN):
         contact_newton.Coupled(place, lines, bad, grown.pressure).solve()
-    closing._shapes[-1] = (np.zeros(0), bad, grown.pressure)
+    closing._trials[-1] = (np.zeros(0), bad, grown.pressure)
     try:
         settled = closing.settle(grown.body.wall, lines)
     except FloatingPointError as error:

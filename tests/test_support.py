@@ -80,7 +80,7 @@ def test_an_equilibrium_a_metre_from_the_origin_stops_at_round_off(order):
     forces = on_sides(seed, g)
     supports = supports_of(seed.body.solid, seed, forces)
     rest = growth.equilibrium(solid, seed.body.theta, X, np.zeros(solid.shape.corners), constrained, prescribed,
-                               forces=forces, supports=supports)
+                              forces=forces, supports=supports)
     assert rest.position == pytest.approx(X + g * seed.body.reference[:, 1:] * [1.0, 0.0], abs=1e-7)
     system = growth.System(solid, constrained, forces=forces, supports=supports,
                            stabilisation=growth.STABILISATIONS[solid.shape.geometry].on(solid, X))

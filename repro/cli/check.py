@@ -9,7 +9,7 @@ from pathlib import Path
 
 from repro.cli.arguments import add_scene, seconds
 from repro.errors import printable, shell_word
-from repro.preflight import LIMIT_OF_BOTH
+from repro.preflight import COMPARISON_TIME
 from repro.runs.progress import say, while_checking
 from repro.scene import load_scene, packaged_scenes
 
@@ -31,7 +31,7 @@ def add(commands) -> None:
     command.add_argument("--no-run", action="store_true", help="make no step of the scene")
     command.add_argument("--error", action="store_true",
                          help="compare the run with a finer one")
-    command.add_argument("--limit", metavar="SECONDS", type=seconds, default=LIMIT_OF_BOTH,
+    command.add_argument("--limit", metavar="SECONDS", type=seconds, default=COMPARISON_TIME,
                          help="processor time of both runs of --error; they are compared as far as "
                          "they come (default: %(default)g)")
     command.add_argument("--json", action="store_true", help="print the result as JSON")

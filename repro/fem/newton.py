@@ -67,30 +67,30 @@ class Newton:
     def solve(self, system: System[State], iterate: State) -> tuple[State, int, bool]:
         """The last iterate, the number of steps, and whether it converged."""
         factors: Factored | None = None
-        last = np.inf
+        previous = np.inf
         for count in range(self.most):
             poll()
             defect = iterate.defect
-            if iterate.complete and solved(system, iterate, last, self.tolerance):
+            if iterate.complete and solved(system, iterate, previous, self.tolerance):
                 return iterate, count, True
             if self.early and count == self.early[0] and defect > self.early[1]:
                 return iterate, count, False
-            if not self.modified_newton or defect > REQUIRED_REDUCTION * last:
+            if not self.modified_newton or defect > REQUIRED_REDUCTION * previous:
                 factors = None
             fresh = factors is None
             factors = factors or system.factored(iterate)
-            last = defect
+            previous = defect
             iterate = system.advanced(iterate, factors, fresh)
         return iterate, self.most, False
 
 
-def solved(system: System[State], iterate: State, last: float, tolerance: float) -> bool:
+def solved(system: System[State], iterate: State, previous: float, tolerance: float) -> bool:
     """Is the defect of an iterate within a tolerance, or does round-off keep it above?
 
-    last: defect of the previous iterate.
+    previous: defect of the previous iterate.
     """
     defect = iterate.defect
-    return defect <= tolerance or defect > STALLED * last and system.at_round_off(iterate)
+    return defect <= tolerance or defect > STALLED * previous and system.at_round_off(iterate)
 
 
 def relative(residual: np.ndarray, size: np.ndarray) -> float:

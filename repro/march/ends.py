@@ -342,9 +342,9 @@ def _mouths(least: float, thick: float, pore: Pore, group: tuple[int, ...],
             around: Outline) -> Iterator[Event]:
     """The events of the films of a surface with itself that separate water from the pore.
 
-    least: um, growth.minimum_film; thick: um, slightly more: behind the film, thinner water than
-    this counts as a part of the film; group: indices of the aggregates with this surface; around:
-    their outline.
+    least: um, growth.minimum_film; thick: um, slightly larger than ``least``: water behind the film
+    that is thinner than this counts as a part of the film; group: indices of the aggregates with
+    this surface; around: their outline.
     """
     for diameter in (thick, 2 * thick):  # the second one finds a film before it is too thin
         film, (x, y) = around.mouth(diameter)

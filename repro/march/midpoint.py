@@ -155,8 +155,8 @@ def _expand(stages: Stages, previous: Pore, after: Pore, half: Halfway, part: fl
 def _slower_advances(previous: Pore, half: Halfway) -> dict[tuple[int, int, int], float]:
     """Advances (um) at the end of a step of the lines that are expected to slow down.
 
-    Lines slow down after the first half as in the last step. After a first contact, its length
-    grows like the square root of time, as that of a round body.
+    Lines slow down after the first half as in the last step. After a first contact, the length of
+    contact grows like the square root of time, as for a round body.
     """
     first, second = (_last_advances(previous, number, half.duration / 2) for number in (0, 1))
     advances = {}

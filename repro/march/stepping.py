@@ -153,9 +153,9 @@ def _find_step(stages: Stages, previous: Pore, solved: Solved, control: StepCont
                 if trial.gaps is not None:  # contact shortened the step, not the error
                     return step, after, control
                 attempted = replace(control, length=length)
-                following = next_step_size(attempted, duration, estimate, tolerance)
-                following = replace(following, length=max(following.length, shortest))
-                return step, after, following
+                next_control = next_step_size(attempted, duration, estimate, tolerance)
+                next_length = max(next_control.length, shortest)
+                return step, after, replace(next_control, length=next_length)
             if trial.gaps:
                 film = stages.growth.minimum_film
                 length = duration * _part_to_contact(*trial.gaps, film)

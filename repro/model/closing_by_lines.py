@@ -61,9 +61,9 @@ class ByLines(Closing):
         self._rule = Clearance(walls, keys.minimum_film, keys.minimum_contact_angle,
                                self.mechanics.numerics.tolerance)
         self._start = self.start.mesh.points, self.start.pressure
-        self._shapes = [(np.zeros(0), *self._start)]
+        self._trials = [(np.zeros(0), *self._start)]
         self._divided: Division | None = None
-        self._shape: Shape | None = None
+        self._solid_shape: Shape | None = None
 
     @property
     def _advances(self) -> dict[tuple[int, int], float]:
@@ -170,7 +170,7 @@ class ByLines(Closing):
         expansion = Expansion(shape, iterations, divisions=divisions,
                               advances=self._lengths(wall, lines))
         trial = advances, expansion.position, shape.pressure[: self.grown.mesh.corners]
-        self._shapes = [*self._shapes[-1:], trial]
+        self._trials = [*self._trials[-1:], trial]
         return expansion
 
     def settle(self, wall: np.ndarray, lines: Sequence[Line]) -> Expansion | None:
@@ -182,7 +182,7 @@ class ByLines(Closing):
         start = [line.advance for line in lines]
         grown = self.grown
         solid, target_J = grown.body.strained
-        points, pressures = self._shapes[-1][1:]
+        points, pressures = self._trials[-1][1:]
         J = solid.strained(points[grown.region.nodes]).J
         try:
             for part in _parts(target_J / J):
@@ -231,10 +231,10 @@ class ByLines(Closing):
             self._divided = self._divided.at(contact.t)
         else:
             self._divided = Division(self.grown.mesh, contact.arcs, contact.t, self.grown.number)
-            self._shape = None
+            self._solid_shape = None
         division = self._divided
-        locked = divided(grown, division, contact, self._shape)
-        self._shape = locked.body.solid.shape
+        locked = divided(grown, division, contact, self._solid_shape)
+        self._solid_shape = locked.body.solid.shape
         if self.forces is None:
             return locked, division, None
         loads = division.divided_loads(grown.mesh.from_region(grown.region, self.forces))
@@ -246,9 +246,9 @@ class ByLines(Closing):
         They are the last two shapes, extrapolated in the advance of the line that moves most; the
         last shape; and the start.
         """
-        last, points, pressure = self._shapes[-1]
-        before, points_before, pressure_before = self._shapes[0]
-        if len(self._shapes) == 2 and len(before) == len(advances):
+        last, points, pressure = self._trials[-1]
+        before, points_before, pressure_before = self._trials[0]
+        if len(self._trials) == 2 and len(before) == len(advances):
             line = np.argmax(np.abs(last - before))
             if last[line] != before[line]:
                 part = (advances[line] - last[line]) / (last[line] - before[line])

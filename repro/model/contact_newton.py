@@ -172,21 +172,22 @@ class Coupled:
 
         Raises GrowthError if there is no convergence.
         """
-        last = np.inf
+        previous = np.inf
         moving = True
         iterate = self.placed.iterate(self.position, self.pressure)
         while True:
             poll()
-            rests = iterate.complete and solved(self.placed.system, iterate, last, tolerance)
-            if rests and self._accepts():
+            in_equilibrium = iterate.complete and solved(self.placed.system, iterate, previous,
+                                                         tolerance)
+            if in_equilibrium and self._accepts():
                 return
             hopeless = self.iterations == EARLY[0] and iterate.defect > EARLY[1]
-            if hopeless or self.iterations == MOST_ITERATIONS or rests and not moving:
+            if hopeless or self.iterations == MOST_ITERATIONS or in_equilibrium and not moving:
                 raise GrowthError("Newton's method for the contact lines stands at a defect of "
                                   f"{iterate.defect:.2g} after {self.iterations} iterations")
-            if iterate.defect > REQUIRED_REDUCTION * last:
+            if iterate.defect > REQUIRED_REDUCTION * previous:
                 self._factors = None
-            last = iterate.defect
+            previous = iterate.defect
             moving, iterate = self._step(iterate)
             self.iterations += 1
 
@@ -235,8 +236,9 @@ class Coupled:
                     change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Steps (L,) of the lines (arcs), and the change of all unknowns with these steps.
 
-        change: of all unknowns, with lines at rest. In the first iteration lines within arcs stay,
-        because the shape is far from the walls, and its clearances say little.
+        change: of all unknowns, with lines at rest. If a line within an arc is to move, the first
+        iteration moves no line: the shape is far from the walls, and its clearances are poor
+        predictions.
         """
         ahead = self.position + _nodal(change, self.position)
         clearances, reaches = self.placed.clearances(ahead, self._lines)
@@ -316,7 +318,10 @@ def _leave_corner(line: Line, clearance: float, reach: float) -> float:
 
 
 def _before_corner(advance: float) -> bool:
-    """Is an advance (arcs) at a corner or just before it? A shortened step ends before BESIDE."""
+    """Is an advance (arcs) at a corner or just before it?
+
+    The distance may exceed BESIDE, because a step to this distance may be shortened.
+    """
     return -1.5 * LEAST_PART <= advance - round(advance) < LEAST_PART
 
 

@@ -55,10 +55,11 @@ class Expansion:
 
     pore: with the new shapes. The fluid's nodes are not yet moved, and the mesh is divided if a
     contact line lies within an arc; iterations: of Newton's method; gaps: um, thinnest film at a
-    wall without contact, in the old shape, and in the new shape before films close; divisions: in
-    their order, one for each aggregate with contact lines within arcs; advances: {(index of the
-    aggregate, wall, direction): um along its grown outline}; bisection: of the grown pore's mesh,
-    before the divisions; None if no triangle is bisected.
+    wall without contact, in the old shape, and in the new shape before films close, infinite if
+    this shape was not computed; divisions: in their order, one for each aggregate with contact
+    lines within arcs; advances: {(index of the aggregate, wall, direction): um along its grown
+    outline}; bisection: of the grown pore's mesh, before the divisions; None if no triangle is
+    bisected.
     """
 
     pore: Pore

@@ -211,9 +211,9 @@ class Front(ABC):
     def advance(self, points: np.ndarray) -> None:
         """Go to the next trial; points: (N, 2) um, of the mesh in the present trial.
 
-        While a film is too thin, the corners up to it join, in the first trial all but one. Then
-        fewer corners join, until the smallest number without a thin film is known. Raises
-        GrowthError if there are no further corners.
+        While a film is too thin, at least one more corner joins (:meth:`predict`). Then fewer
+        corners join, until the smallest number without a thin film is known. Raises GrowthError if
+        no further corner can join.
         """
         if not self.too_thin(points, self.joined):
             self.first_enough = self.joined
@@ -503,8 +503,8 @@ class Welding:
     def _within_arcs(self, shape: Pore) -> Expansion:
         """The shape with each end of a weld and each contact line within the last arcs that joined.
 
-        shape: the equilibrium with these arcs. It is the result if ``within_arcs`` is False, if
-        there is no equilibrium with a shorter one, or if its films are too thin.
+        shape: the equilibrium with these arcs. It is the result if ``within_arcs`` is False, if an
+        equilibrium with divided arcs fails, or if no division leaves films that are thick enough.
         """
         entire = Expansion(self._marked(shape), self._iterations, advances=self._advances)
         inside = [k for k, front in enumerate(self._fronts) if front.joined and not front.new]

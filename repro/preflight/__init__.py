@@ -2,4 +2,4 @@
 
 #: Processor time (s) of a run and a finer one together, if they are compared. Base to 19.4 h needs
 #: 5 s in fast, 52 s in paper.
-LIMIT_OF_BOTH = 120.0
+COMPARISON_TIME = 120.0

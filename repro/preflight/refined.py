@@ -18,7 +18,7 @@ from repro.errors import RunEnd, SimulationError, StageError
 from repro.march.simulation import steps
 from repro.model.meshing import MOST_REFINED, resolution
 from repro.polling import OutOfTime, poll, within
-from repro.preflight import LIMIT_OF_BOTH
+from repro.preflight import COMPARISON_TIME
 from repro.preflight.checked import WIDTH
 from repro.preflight.memory import require_memory, require_outline
 from repro.results import names
@@ -99,7 +99,7 @@ class FinerComparison:
 
 @typed
 def error(scene: Source, overrides: Overrides = (), *, unset: Sequence[str] = (),
-          limit: float = LIMIT_OF_BOTH) -> FinerComparison:
+          limit: float = COMPARISON_TIME) -> FinerComparison:
     """Compare a run of a scene with a finer run, to see whether its mesh is fine enough.
 
     Parameters

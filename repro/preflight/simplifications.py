@@ -27,7 +27,7 @@ from repro.scene.keys import RATIO
 
 #: The numbers of a scene by their names.
 Numbers = dict[str, Number]
-#: Finds warnings of a scene, its numbers and the sizes of its aggregates.
+#: Yields warnings from a scene, its numbers and the sizes of its aggregates.
 Check = Callable[[Scene, Numbers, Sizes], Iterator["Caveat"]]
 
 #: (1) neglects inertia, whose ratio to the viscous forces is of the order of the Reynolds number.
@@ -97,8 +97,8 @@ CHECKS: list[tuple[Check, tuple[str, ...]]] = []
 
 
 def _check(*parts: str) -> Callable[[Check], Check]:
-    """Add a function to the checks; parts: that it needs. No warning mentions a part that is left
-    out."""
+    """Add a function to the checks. It runs only if the scene has all ``parts``, so no warning
+    mentions a part that the scene leaves out."""
     def add(find: Check) -> Check:
         CHECKS.append((find, parts))
         return find

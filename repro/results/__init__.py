@@ -40,6 +40,8 @@ from repro.scene import Scene, scene_hash, scene_tables
 
 #: Factor from um/h to m/d.
 M_PER_D = UNITS["_m_per_d"].factor
+#: Packages whose versions belong to the origin of a result.
+PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -93,8 +95,7 @@ def provenance(scene: Scene) -> dict:
     """
     versions = {"dupin2001-repro": version("dupin2001-repro"),
                 "python": platform.python_version()}
-    packages = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
-    versions |= {name: version(name) for name in packages}
+    versions |= {name: version(name) for name in PACKAGES}
     exchanged = scene.numerics.exchanged
     scheme = {} if exchanged is None else {"scheme": asdict(exchanged)}
     return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),

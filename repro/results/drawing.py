@@ -304,8 +304,8 @@ def film(results: Results, name: str, file: Path, ax: Any = None, style: Style =
 def _write_gif(file: Path, frames: Callable[[Any], Iterator[Any]], ax: Any) -> Any:
     """Write frames in one palette, in the layout of the first one.
 
-    The palette covers the colours of about ten frames. By their frequency it would lack most of the
-    colour bar.
+    The palette covers the range of colours in at most ten frames. A palette of their most frequent
+    colours would lack most of the colour bar.
     """
     image = optional("PIL.Image")
     contents: list[io.BytesIO] = []

@@ -217,9 +217,10 @@ def _time(run: SweepRun) -> float:
 def _table(sweep: Sweep, runs: list[SweepRun]) -> str:
     quantities = KNOWN | {each.name: each for each in NUMBERS}
     values = [run.numbers | run.final for run in runs]
-    known = ("end_h", "clogging_time_h", "clogging_biomass", "contact_time_h", "contact_biomass",
-             *ANSWER, "wall_time_s")
-    shown = [name for name in known if any(each.get(name) is not None for each in values)]
+    candidates = ("end_h", "clogging_time_h", "clogging_biomass", "contact_time_h",
+                  "contact_biomass", *ANSWER, "wall_time_s")
+    shown = [name for name in candidates
+             if any(each.get(name) is not None for each in values)]
     names = ["run", *(factor.key for factor in sweep.factors)]
     for number in map(quantities.__getitem__, shown):
         symbol = number.unit.symbol

@@ -1137,8 +1137,8 @@ MUTANTS = (
         ("shorter-than-the-shortest",
          "Steps become shorter than the shortest length to meet a tolerance.",
          "_find_step",
-         "replace(following, length=max(following.length, shortest))",
-         "replace(following, length=following.length)",
+         "max(next_control.length, shortest)",
+         "next_control.length",
          f"{NOT_MET}[options0]")),
     *changes(
         "repro/march/step_control.py",
