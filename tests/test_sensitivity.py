@@ -83,7 +83,7 @@ def straight(x, size):
 
 @pytest.mark.parametrize("law, within, fits", [
     (straight, True, True), (curved, False, True), (scattering, True, False)])
-def test_a_set_is_reached_if_it_is_within_the_rounding_and_fits_with_its_bars(law, within, fits):
+def test_a_set_is_reached_if_it_fits_with_its_bars(law, within, fits):
     """Neither condition alone suffices."""
     slope = -4.0 if law is curved else -8.0
     elasticities = {number: {each.name: {"elasticity": 0.0} for each in INPUTS} for number in rounding.PRINTED}

@@ -6,6 +6,7 @@ case. A run of some cases replaces their entries and does not change the others.
 """
 
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from itertools import chain, groupby
 from os.path import commonprefix
@@ -200,15 +201,24 @@ def mutant_state() -> str:
     return f"{count} by `make mutants`, {state}."
 
 
+def _catchers(names: Iterable[str]) -> str:
+    """Cases and tests, each file of tests once."""
+    files = defaultdict(list)
+    for name in names:
+        file, _, test = TEST.sub(r"\1: ", name).rpartition(": ")
+        files[file].append(test)
+    return ", ".join((f"{file}: " if file else "") + ", ".join(tests) for file, tests in files.items()) or "not caught"
+
+
 def mutant_blocks(stages: Mapping[str, Iterable[Mutant]], state: str) -> list[str]:
     """A table a stage: mutants, and the cases or tests that caught them when they were last run.
 
-    A test is written as its file and its name without "test", so that the page stays short.
+    A test is written as its file and its name without "test", and a file only once in a row, so that the page stays
+    short.
     """
     records = runner.recorded()
     blocks = [state]
     for stage, chosen in stages.items():
-        caught = {mutant.id: ", ".join(records[mutant.id]["caught_by"]) or "not caught" for mutant in chosen}
-        rows = [(mutant.id, mutant.says, TEST.sub(r"\1: ", caught[mutant.id])) for mutant in chosen]
+        rows = [(mutant.id, mutant.says, _catchers(records[mutant.id]["caught_by"])) for mutant in chosen]
         blocks += [f"## {stage}", table(("mutant", "what is wrong with it", "caught by"), rows)]
     return blocks
