@@ -1962,7 +1962,7 @@ MUTANTS = (
          "A film has the most frequent colours of its first frame only.",
          "_write_gif",
          "sample.quantize(method=image.Quantize.MAXCOVERAGE)",
-         "pictures[0].quantize()",
+         "image.open(contents[0]).convert('RGB').quantize()",
          "tests/test_drawing.py::test_a_film_has_the_colours_of_its_colour_bar_in_all_frames"),
         ("film-of-own-scales",
          "Each frame of a film has colours of its own.",
