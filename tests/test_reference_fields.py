@@ -1,6 +1,7 @@
 """Closed forms and manufactured fields of the references obey their equations, by finite differences.
 
-The cases that compare them with `repro` judge the other codes (FiPy, collocation, scikit-fem) and the dense transfer.
+The cases that compare them with `repro` judge the other codes (FiPy, py-pde, collocation, scikit-fem) and the dense
+transfer.
 """
 import numpy as np
 import pytest

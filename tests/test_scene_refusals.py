@@ -424,7 +424,7 @@ def test_a_factor_without_dimension_is_refused(name):
         for text in (f"5 {unit} {name}", f"5 {name} {unit}", f"5 {unit}*{name}^2", f"5 {unit} / {name}"):
             with pytest.raises(ValueError, match="in this unit|of this kind" if unit == "rad" else f'"{name}'):
                 units.to_internal(text, unit)
-    if exact.UNITS.get(name, (1, 1))[1:] != exact.UNITS["rad"][1:]:
+    if name not in ("deg", "degree", "degrees", "rad", "radian", "radians"):
         pytest.raises(ValueError, units.to_internal, f"5 {name}", "rad")
 
 

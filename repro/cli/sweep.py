@@ -18,6 +18,8 @@ from repro.sweeps import CLOGGED
 if TYPE_CHECKING:
     from repro.sweeps.driver import Swept
 
+#: Exit status if some runs have failed.
+SOME_FAILED = 3
 EPILOG = """\
 --vary takes a range KEY=a:b UNIT:linear|log:N or a list KEY=VALUE, VALUE, ... Several --vary make a
 grid. --points takes a CSV file instead, with a run in each row. With --samples a range has no N:
@@ -104,4 +106,4 @@ def _report(swept: Swept) -> int:
     finished = len(swept.runs) - len(swept.failed)
     say(printable(f"{swept.source}: {finished} of {len(swept.runs)} runs done, "
                   f"{len(swept.failed)} failed; results in {swept.folder}"))
-    return 3 if swept.failed else 0  # as the help says
+    return SOME_FAILED if swept.failed else 0

@@ -244,6 +244,7 @@ class System:
         self.strained = LastResult(solid.strained)
         self.theta = self.target = np.empty(0)
         self.sizes = np.empty(0)
+        self._last_tangent: tuple[Iterate | None, np.ndarray] = None, np.empty(0)
 
     def under(self, theta: np.ndarray, target: np.ndarray, position: np.ndarray,
               pressure: np.ndarray) -> Iterate:
@@ -339,7 +340,7 @@ class System:
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
-        factors = self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
+        factors = self.sparse.factored(self._tangent_at(iterate))
         if not self.supports:
             return factors
         loads = np.zeros((len(iterate.residual), len(self.supports)))
@@ -347,16 +348,22 @@ class System:
         points = np.array([support.point for support in self.supports])
         return Supported(factors.system, factors.elements, factors.solver, loads, points)
 
+    def _tangent_at(self, iterate: Iterate) -> np.ndarray:
+        """The tangent at an iterate, kept for the next call with the same one."""
+        if self._last_tangent[0] is not iterate:
+            self._last_tangent = iterate, self.tangent(iterate.position, iterate.pressure)
+        return self._last_tangent[1]
+
     def at_round_off(self, iterate: Iterate) -> bool:
         """Can round-off explain the residual of each free unknown?
 
-        In K x each stored value x of the k nodes is rounded, and so are its product and the sum. A
-        row may therefore err by (k + 1) unit round-offs of |K| |x|. Beside an element much smaller
-        than x this exceeds NEWTON times the terms of the row.
+        A row of the residual is a sum K x over the k nodes of a triangle, with positions and
+        pressures x. Storage rounds x, and the products and their sum are rounded, too. A row may
+        therefore err by (k + 1) unit round-offs of |K| |x|. In an element much smaller than x, this
+        error is larger than NEWTON times the terms of the row.
         """
         values = np.concatenate([iterate.position.T.ravel(), iterate.pressure])
-        tangent = self.tangent(iterate.position, iterate.pressure)
-        terms = self.sparse.product(np.abs(tangent), np.abs(values))
+        terms = self.sparse.product(np.abs(self._tangent_at(iterate)), np.abs(values))
         for support in self.supports:
             share = support.load / support.load[support.point]
             terms[: len(share)] += terms[support.point] * share

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 PREFIXES = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "d": -1,
             "h": 2, "k": 3, "M": 6, "G": 9}
+PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as many digits as pint's
 FACTOR = re.compile(r"(?P<sign>[*/ ]*)(?P<name>[^\W\d_]+)(?:(?:\^|\*\*)?(?P<power>-?[1-9]))?")
 
 
@@ -33,18 +34,15 @@ PREFIXED = {"m": Unit(Fraction(1), length=1), "g": Unit(Fraction(1, 1000), mass=
             "s": Unit(Fraction(1), time=1),
             "L": Unit(Fraction(1, 1000), length=3), "l": Unit(Fraction(1, 1000), length=3),
             "Pa": Unit(Fraction(1), -1, 1, -2)}
+#: Other units, each with its names.
+NAMED = {"min minute minutes": Unit(Fraction(60), time=1),
+         "h hr hour hours": Unit(Fraction(3600), time=1),
+         "d day days": Unit(Fraction(86_400), time=1),
+         "rad radian radians": Unit(Fraction(1)), "deg degree degrees": Unit(PI / 180)}
 #: Every known spelling.
 UNITS = {prefix + name: unit._replace(size=unit.size * Fraction(10) ** power)
          for name, unit in PREFIXED.items() for prefix, power in PREFIXES.items()}
-UNITS |= {name: unit for names, unit in {
-    "min minute minutes": Unit(Fraction(60), time=1),
-    "h hr hour hours": Unit(Fraction(3600), time=1),
-    "d day days": Unit(Fraction(86_400), time=1),
-    "rad radian radians": Unit(Fraction(1)),
-    # Pi has as many digits as pint's.
-    "deg degree degrees": Unit(Fraction("3.1415926535897932384626433832795028841971693993751")
-                               / 180),
-}.items() for name in names.split()}
+UNITS |= {name: unit for names, unit in NAMED.items() for name in names.split()}
 
 
 def conversion(from_unit: str, unit: str) -> Fraction | None:
